@@ -46,7 +46,7 @@ class NoSuchItemError(EnumsolError, IndexError):
 
 
 class NotHeldError(EnumsolError, ValueError):
-    """What was asked is not available for a body that nothing holds (one with ``rigid_modes``).
+    """A call is not available for a body that nothing holds (one with ``rigid_modes``).
 
     Examples
     --------
@@ -98,29 +98,25 @@ class MissingDependencyError(EnumsolError, ImportError):
 
 
 class _PartialResultError(EnumsolError):
-    """Base of the errors that hold what was found before they were raised."""
+    """Base of the errors that hold what was found before they were raised.
 
-    def __init__(self, message: str, partial: Any) -> None:
+    Attributes
+    ----------
+    happened : str
+        What became of the call, for messages; of errors that end it from outside.
+    """
+
+    happened: ClassVar[str]
+
+    def __init__(self, message: str, partial: object = None) -> None:
         super().__init__(message)
-        self.partial = partial
+        self.partial: Any = partial
 
     def __reduce__(self) -> tuple[Any, ...]:
         return type(self), (str(self), self.partial)  # a worker process may send it back
 
 
-class _EndedError(_PartialResultError):
-    """Base of the errors that end a call from outside.
-
-    Attributes
-    ----------
-    happened : str
-        What became of the call, for messages.
-    """
-
-    happened: ClassVar[str]
-
-
-class Interrupted(_EndedError, KeyboardInterrupt):  # noqa: N818 (the name is part of the public interface)
+class Interrupted(_PartialResultError, KeyboardInterrupt):  # noqa: N818 (the name is part of the public interface)
     """Ctrl-C during a search; what was found so far is in ``partial``.
 
     Attributes
@@ -133,7 +129,7 @@ class Interrupted(_EndedError, KeyboardInterrupt):  # noqa: N818 (the name is pa
     happened = "was interrupted"
 
 
-class OutOfMemoryError(_EndedError, MemoryError):
+class OutOfMemoryError(_PartialResultError, MemoryError):
     """The memory did not suffice for a search; what was found so far is in ``partial``.
 
     Attributes
@@ -153,9 +149,6 @@ class OutputError(_PartialResultError):
     partial : RootSet or None
         For enumerate_roots with a ``proof_path``: the result of the search, which went on without a proof.
     """
-
-    def __init__(self, message: str, partial: Any = None) -> None:
-        super().__init__(message, partial)
 
 
 class FrictionJumpWarning(UserWarning):

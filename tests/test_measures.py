@@ -11,13 +11,13 @@ from documents import ROOT
 
 #: A change that lowers a measure lowers its bound; one that has to raise it says why in its commit.
 BOUNDS = {
-    "code lines": 46_532,
-    "classes": 600,
+    "code lines": 44_854,
+    "classes": 559,
     "kinds of records": 20,
-    "parameters annotated Any": 330,
-    "files": 332,
-    "docstrings that begin with a pronoun": 68,
-    "class names used twice or more": 10,
+    "parameters annotated Any": 83,
+    "files": 288,
+    "docstrings that begin with a pronoun": 24,
+    "class names used twice or more": 9,
 }
 _NO_CODE = (tokenize.COMMENT, tokenize.NL, tokenize.NEWLINE, tokenize.INDENT, tokenize.DEDENT, tokenize.ENDMARKER)
 _PRONOUN = re.compile(r"(What|Of|The same|Where|Those|That|As|In which|How|Whether|One)\b")

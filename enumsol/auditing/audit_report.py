@@ -13,7 +13,7 @@ from enumsol.roots.root import summary
 from enumsol.support.messages import TextEnum, counted
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Sequence
+    from collections.abc import Iterable, Iterator, Sequence
 
     import pandas as pd
 
@@ -265,19 +265,14 @@ class AuditReport:
     def summary(self) -> dict[str, Any]:
         """Counts, claims and lists as plain values, for JSON."""
         return {
-            "ok": self.ok,
-            "complete": self.complete,
-            "all_visited": self.all_visited,
-            "graph_complete": self.graph_complete,
+            **{name: getattr(self, name) for name in ("ok", "complete", "all_visited", "graph_complete")},
             "graph_reasons": list(self.graph_reasons),
             "points": len(self.points),
             "row_numbers": ROWS,
             "tolerance": self.tolerance,
             "max_distance": self.max_distance,
-            "off": [_point_record(self.points[k]) for k in self.off],
-            "not_compared": [_point_record(self.points[k]) for k in self.not_compared],
-            "jumps": [_jump_record(jump) for jump in self.jumps],
-            "unjoined": [_jump_record(jump) for jump in self.unjoined],
+            **{name: [_point_record(self.points[k]) for k in getattr(self, name)] for name in ("off", "not_compared")},
+            **{name: [_jump_record(jump) for jump in getattr(self, name)] for name in ("jumps", "unjoined")},
             "visited": sorted(self.visited),
             "missed": [{**vars(item), "statuses": [status.value for status in item.statuses]} for item in self.missed],
             "missed_families": list(self.missed_families),
@@ -320,7 +315,7 @@ class AuditReport:
         return f"{'ok' if self.ok else 'not ok'}, {visits}"
 
     @staticmethod
-    def _listed(items: Any) -> Iterator[str]:
+    def _listed(items: Iterable[AuditedPoint | Jump | MissedArc | str]) -> Iterator[str]:
         found = tuple(items)
         for item in found[:_PRINTED]:
             yield f"    {_line(item)}"

@@ -25,6 +25,7 @@ if TYPE_CHECKING:
     from enumsol.branches.graph import BranchGraph
     from enumsol.continuation.continuation_options import ContinuationOptions
     from enumsol.model.problem3d import AnyProblem
+    from enumsol.roots.root import Root
     from enumsol.support.array_types import AlphaLike, Floats
 
 
@@ -145,7 +146,7 @@ class _Coverage:
     failures: list[tuple[float, str]] = field(default_factory=list)
     visited: set[int] = field(default_factory=set)
 
-    def start(self, start: Any) -> None:
+    def start(self, start: Root | _Seed) -> None:
         """Follow a start in both directions unless its arc was passed before."""
         x = self.chart.point(float(start.alpha), start.lambda_n, start.lambda_t, start.rigid_coordinates)
         place = self.chart.place(x)

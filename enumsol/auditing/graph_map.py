@@ -6,7 +6,7 @@ import math
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import pairwise
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, cast
 
 import numpy as np
 
@@ -25,13 +25,11 @@ if TYPE_CHECKING:
     from enumsol.roots.root import Polytope
     from enumsol.support.array_types import Floats
 
-#: Step of difference quotients along an arc, relative to its length.
-_DIFFERENCE = 1e-6
 #: What a graph must have.
 _ASKED = ("problem", "interval", "arcs", "vertices", "branches", "complete", "reasons")
 
 
-def checked_graph(graph: Any) -> BranchGraph:
+def checked_graph(graph: object) -> BranchGraph:
     """The argument ``graph`` as a branch graph.
 
     Raises
@@ -40,14 +38,13 @@ def checked_graph(graph: Any) -> BranchGraph:
         It is something else.
     """
     lacking = [name for name in _ASKED if not hasattr(graph, name)]
-    if lacking or not isinstance(graph.problem, ContactBody):
+    if lacking or not isinstance(getattr(graph, "problem", None), ContactBody):
         why = f", which has no {lacking[0]}" if lacking else ""
         raise InvalidArgumentError(
             f"graph is a {type(graph).__name__}{why}; expected a BranchGraph, which holds arcs over an interval "
             "(of branch_graph or BranchGraph.load)"
         )
-    found: BranchGraph = graph
-    return found
+    return cast("BranchGraph", graph)
 
 
 class GraphPlaceKind(TextEnum):
@@ -191,7 +188,7 @@ class GraphMap:
             if distance >= 0.999 * best:
                 break
             best = distance
-            step = _DIFFERENCE * (high - low)
+            step = 1e-6 * (high - low)
             # a distance below this fraction of the tolerance need not be made smaller
             if best <= 1e-4 * self.tolerance or step == 0:
                 break

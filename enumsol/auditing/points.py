@@ -7,7 +7,7 @@ from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import groupby
-from typing import IO, TYPE_CHECKING, Any, Literal
+from typing import IO, TYPE_CHECKING, Any, Literal, cast
 
 import numpy as np
 
@@ -58,7 +58,7 @@ class PointRun:
 
 
 def read_points(
-    source: Any, problem: AnyProblem, *, columns: Columns = "auto", name: str | None = None
+    source: object, problem: AnyProblem, *, columns: Columns = "auto", name: str | None = None
 ) -> tuple[PointRun, ...]:
     """The runs of points in a source; none where it holds no point.
 
@@ -96,9 +96,9 @@ def read_points(
     if isinstance(source, (str, os.PathLike)) or hasattr(source, "read"):
         place = os.fspath(source) if isinstance(source, (str, os.PathLike)) else getattr(source, "name", "the file")
         name = name or str(place)
-        source = _read_csv(source, name)
+        source = _read_csv(cast("str | IO[str]", source), name)
     if hasattr(source, "columns") and hasattr(source, "iloc"):
-        return _from_frame(source, problem, columns, name or "path")
+        return _from_frame(cast("pd.DataFrame", source), problem, columns, name or "path")
     kind = type(source).__name__
     raise InvalidArgumentError(f"path is a {kind}; expected a Path, several of them, a DataFrame or a CSV file")
 
@@ -257,7 +257,7 @@ def _numbers(frame: pd.DataFrame, title: str, name: str) -> Floats:
     return values
 
 
-def _number(cell: Any, what: str, row: int) -> float:
+def _number(cell: float | str, what: str, row: int) -> float:
     if _empty(cell):
         return np.nan
     try:
@@ -266,7 +266,7 @@ def _number(cell: Any, what: str, row: int) -> float:
         raise InvalidArgumentError(f"{what} is not numeric in row {row} ({str(cell)!r}); expected a number") from None
 
 
-def _empty(cell: Any) -> bool:
+def _empty(cell: float | str) -> bool:
     if isinstance(cell, str):
         return not cell.strip()
     import pandas as pd  # slow to import, used here only

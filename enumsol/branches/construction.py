@@ -15,8 +15,7 @@ from enumsol.errors import InvalidArgumentError
 from enumsol.model.problem import ContactProblem, check_is_problem
 from enumsol.search.outcome import StopReason
 from enumsol.support import arguments
-from enumsol.support.deadlines import Deadline, TimeOverError, within
-from enumsol.support.keeping import keeping
+from enumsol.support.deadlines import Deadline, TimeOverError, keeping, within
 from enumsol.support.workers import workers_of
 
 if TYPE_CHECKING:
@@ -26,7 +25,7 @@ if TYPE_CHECKING:
     from enumsol.branches.space.space_graph import ByCurves
     from enumsol.model.problem3d import AnyProblem
     from enumsol.support.array_types import AlphaLike
-    from enumsol.support.keeping import Ending
+    from enumsol.support.deadlines import Ending
 
 
 def branch_graph(

@@ -14,7 +14,8 @@ import numpy as np
 
 from enumsol.errors import InvalidArgumentError
 from enumsol.model.statuses import OPEN, SLIP_MINUS, SLIP_PLUS, STICK, ContactStatus
-from enumsol.roots.root import ContactState, RootFamily
+from enumsol.roots.local_branch import ContactState
+from enumsol.roots.root import RootFamily
 from enumsol.support.arguments import alpha_value
 from enumsol.support.messages import TextEnum
 
@@ -287,6 +288,13 @@ class Branch:
     def sheet(self) -> bool:
         """True if it is a sheet."""
         return any(arc.dimension for arc in self.arcs)
+
+
+def shape_of(branch: Branch) -> str:
+    """Shape of a branch in a word: sheet, loop, path, or unfinished where something at it was left open."""
+    if branch.sheet or branch.closed:
+        return "sheet" if branch.sheet else "loop"
+    return "unfinished" if any(v.kind is VertexKind.UNSETTLED for v in branch.vertices) else "path"
 
 
 #: What networkx's graph shows of vertices and arcs.

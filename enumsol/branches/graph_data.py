@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 from enumsol.arithmetic.algebraic import CriticalAlpha
 from enumsol.arithmetic.rationals import rational
 from enumsol.branches.claims import Claims, Standing, ranges_text
-from enumsol.branches.elements import VertexKind, make_branches, make_components, multigraph
+from enumsol.branches.elements import VertexKind, make_branches, make_components, multigraph, shape_of
 from enumsol.errors import InvalidArgumentError
 from enumsol.roots.root_set import by_axis
 from enumsol.support.arguments import alpha_value
@@ -252,7 +252,7 @@ def graph_html(data: GraphData) -> str:
     rows = [
         (
             branch.number,
-            _shape(branch),
+            shape_of(branch),
             len(branch.arcs),
             *(f"{end:.6g}" for end in branch.interval),
             ", ".join(f"{v.alpha:.6g}" for v in branch.folds),
@@ -286,17 +286,9 @@ def _branch_line(branch: Branch) -> str:
     folds = ", ".join(f"{v.alpha:.6g}" for v in branch.folds)
     width = f", length {hi - lo:.3g}" if f"{lo:.6g}" == f"{hi:.6g}" else ""
     arcs = counted(len(branch.arcs), "arc")
-    return f"  branch {branch.number}: {_shape(branch)}, {arcs}, alpha in [{lo:.6g}, {hi:.6g}]{width}" + (
+    return f"  branch {branch.number}: {shape_of(branch)}, {arcs}, alpha in [{lo:.6g}, {hi:.6g}]{width}" + (
         f", folds at {folds}" if folds else ""
     )
-
-
-def _shape(branch: Branch) -> str:
-    if branch.sheet:
-        return "sheet"
-    if branch.closed:
-        return "loop"
-    return "unfinished" if any(v.kind is VertexKind.UNSETTLED for v in branch.vertices) else "path"
 
 
 def arcs_frame(data: GraphData) -> pd.DataFrame:

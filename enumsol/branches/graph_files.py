@@ -38,7 +38,7 @@ if TYPE_CHECKING:
     from pathlib import Path
 
     from enumsol.model.problem3d import AnyProblem
-    from enumsol.support.array_types import Codes
+    from enumsol.support.array_types import Codes, Floats
 
 _Graph = TypeVar("_Graph", bound=GraphData)
 FORMAT, VERSION = "enumsol-branch-graph", 3
@@ -205,42 +205,34 @@ def _values(
 
 
 def _problem_record(problem: AnyProblem) -> dict[str, Any]:
-    plane = isinstance(problem, ContactProblem)
-    return {
+    plane, mesh = isinstance(problem, ContactProblem), problem.mesh
+    record = {
         **{name: _matrix_record(getattr(problem, name)) for name in (*_ROWS[plane], "A")},
         **{name: getattr(problem, name).tolist() for name in ("f", "gap", "slip_offset")},
         # of saved graphs in 2D, "friction" has F0 and F1 of F0 + alpha F1
         "friction": [part.tolist() for part in (problem.affine_friction if plane else problem.friction)],
-        **({} if isinstance(problem, ContactProblem) else _space_record(problem)),
-        "load_slope": None if problem.load_slope is None else problem.load_slope.tolist(),
+        "load_slope": _listed(problem.load_slope),
         "node_ids": list(problem.node_ids),
-        **_rigid_record(problem),
-        **({} if problem.mass is None else {"mass": _matrix_record(problem.mass)}),
-        "coordinates": None if problem.coordinates is None else problem.coordinates.tolist(),
-        "mesh": _mesh_record(problem.mesh),
+        "coordinates": _listed(problem.coordinates),
+        "mesh": None,
     }
+    if not isinstance(problem, ContactProblem):
+        record["friction_slope"] = [part.tolist() for part in problem.friction_slope]
+        record["areas"] = _listed(problem.areas)
+    if problem.rigid_modes is not None:
+        record["rigid_modes"] = problem.rigid_modes.tolist()
+        record["max_rigid_displacement"] = problem.max_rigid_displacement
+    if problem.mass is not None:
+        record["mass"] = _matrix_record(problem.mass)
+    if mesh is not None:
+        arrays = {name: _listed(getattr(mesh, name)) for name in ("points", "cells", "offset")}
+        more = {} if mesh.lame is None else {"lame": mesh.lame.tolist()}
+        record["mesh"] = arrays | {"motion": _matrix_record(mesh.motion)} | more
+    return record
 
 
-def _space_record(problem: ContactProblem3D) -> dict[str, Any]:
-    return {
-        "friction_slope": [part.tolist() for part in problem.friction_slope],
-        "areas": None if problem.areas is None else problem.areas.tolist(),
-    }
-
-
-def _rigid_record(problem: AnyProblem) -> dict[str, Any]:
-    if problem.rigid_modes is None:
-        return {}
-    return {"rigid_modes": problem.rigid_modes.tolist(), "max_rigid_displacement": problem.max_rigid_displacement}
-
-
-def _mesh_record(mesh: BodyMesh | None) -> dict[str, Any] | None:
-    if mesh is None:
-        return None
-    offset = None if mesh.offset is None else mesh.offset.tolist()
-    points, cells = mesh.points.tolist(), mesh.cells.tolist()
-    record = {"points": points, "cells": cells, "motion": _matrix_record(mesh.motion), "offset": offset}
-    return record if mesh.lame is None else record | {"lame": mesh.lame.tolist()}
+def _listed(array: Floats | None) -> list[Any] | None:
+    return None if array is None else array.tolist()
 
 
 def _matrix_record(matrix: sp.sparray) -> dict[str, Any]:

@@ -19,7 +19,7 @@ from enumsol.model.statuses import STATUSES, ContactStatus
 from enumsol.roots.enumerate import enumerate_roots
 from enumsol.roots.local_branch import ratios
 from enumsol.support.arguments import alpha_list, even_alphas, optional_callable, optional_executor
-from enumsol.support.keeping import keeping
+from enumsol.support.deadlines import keeping
 from enumsol.support.messages import counted
 from enumsol.support.workers import spread, workers_of
 

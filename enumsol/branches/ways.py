@@ -1,12 +1,9 @@
-"""The ways in which a graph is worked out: what is searched, what certifies it, and how arcs are followed.
-
-By balls, where the problem can be enclosed; by algebra in rationals, where that is fast or balls leave something open.
-"""
+"""The way in which a graph is worked out: what is searched, what certifies it, and how arcs are followed."""
 
 from __future__ import annotations
 
 from contextlib import suppress
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import partial
 from typing import TYPE_CHECKING, Literal
 
@@ -29,12 +26,7 @@ from enumsol.errors import TooLargeError
 from enumsol.model.statuses import OPEN, SLIP_MINUS, SLIP_PLUS, STICK
 from enumsol.search.certifiers.interval_certifiers import ExactIntervalCertifier, VerifiedIntervalCertifier
 from enumsol.search.outcome import Stop, StopReason
-from enumsol.search.subintervals import (
-    IntervalCertifier,
-    IntervalSearch,
-    on_weak_springs,
-    run_parallel,
-)
+from enumsol.search.subintervals import IntervalCertifier, IntervalSearch, on_weak_springs, run_parallel
 from enumsol.support.deadlines import Deadline, Limited, TimeOverError, over, within
 
 if TYPE_CHECKING:
@@ -92,37 +84,53 @@ class Made:
     left_open: tuple[tuple[Fraction, Fraction], ...] | None = None
 
 
+@dataclass
 class PlaneWay:
-    """Base of the ways in 2D: the selections that a search over the interval leaves, and their arcs.
+    """The way in 2D: the selections that a search over the interval leaves, and their arcs.
 
-    A way keeps what it has worked out, so that an interruption loses none of it. Those in 3D are in ``space_graph``.
+    Arcs are followed in balls; or by algebra, as functions of alpha in rationals, where there are no balls, or these
+    leave something open and algebra does not take too long. A way keeps what it has worked out, so that an interruption
+    loses none of it. Those in 3D are in ``space_graph``.
 
     Attributes
     ----------
     problem : ContactProblem
     interval : (Fraction, Fraction)
     certifier : IntervalCertifier
-    origin : Fraction or None
-        The alpha at which g vanishes.
     exact : ExactCondensed or None
         The problem in rationals, where arcs are worked out by algebra.
+    traced : TracedProblem or None
+        The problem in balls, where they are followed in these.
     search : IntervalSearch or None
         None until it has begun.
     candidates : set of codes, or None
         Selections that may hold somewhere; None while they are searched.
+    closed : ClosedPieces
+    traces : list of Trace
+        Of selections that are finished.
+    followed : Followed or None
+        Arcs in balls that left something open.
+    known : KnownSelections or None
     """
 
     problem: ContactProblem
     interval: tuple[Fraction, Fraction]
     certifier: IntervalCertifier
-    exact: ExactCondensed | None
+    exact: ExactCondensed | None = None
+    traced: TracedProblem | None = None
     search: IntervalSearch | None = None
     candidates: set[Codes] | None = None
+    closed: ClosedPieces = field(default_factory=ClosedPieces)
+    traces: list[Trace] = field(default_factory=list)
+    followed: Followed | None = None
+    known: KnownSelections | None = None
 
     @property
     def origin(self) -> Fraction | None:
         """The alpha at which g vanishes."""
-        raise NotImplementedError
+        if self.traced is not None:
+            return self.traced.origin
+        return None if self.exact is None else self.exact.zero
 
     def begin(
         self, max_nodes: int | None = None, limits: Limited | None = None, tick: Tick | None = None
@@ -151,15 +159,16 @@ class PlaneWay:
             # lambda = 0 is the only solution at every alpha, and every selection holds there: one is enough
             self.candidates = {(OPEN,) * self.exact.p}
             return
-        self.close(search)
+        if self.traced is not None and self.problem.held:
+            # pieces that need no tree are found while there is time
+            search.closed = self.closed.pieces
+            with suppress(TimeOverError), within(Deadline(search.deadline)):
+                self.closed.find(self.traced)
         if executor is None:
             search.run()
         else:
             run_parallel(executor, search)
         self.candidates = search.selections
-
-    def close(self, search: IntervalSearch) -> None:
-        """Find pieces that need no tree, while there is time; none are known here."""
 
     def made(self, limits: Deadline, tick: Tick | None) -> Made:
         """Arcs, worked out and joined by a deadline; what is not joined stays open."""
@@ -179,7 +188,34 @@ class PlaneWay:
 
     def worked_out(self, effort: Effort) -> Made:
         """Arcs of the selections that were found."""
-        raise NotImplementedError
+        search, candidates = self._found()
+        if self.exact is None and self.traced is not None:
+            self.followed = followed = self._follow(self.traced, effort)
+            joined, problem = followed.joined, self.problem
+            stopped = search.stopped is not None or followed.stopped is not None
+            large = over() or problem.n > EXACT_DOF_LIMIT or _exact_work(problem, candidates) > LARGEST_EXACT_WORK
+            if (joined.ordered and not joined.open) or stopped or large:
+                return self._made(make_traced(self.traced, joined), followed.reasons, followed.stopped)
+            # several conditions vanish at one alpha, or a selection is singular
+            self.exact = ExactCondensed.from_problem(problem)
+        if self.known is None:
+            assert self.exact is not None
+            a, b = (rational(end) for end in search.interval)
+            self.known = KnownSelections(self.exact, a, b, cut_short=search.stopped is not None)
+        few = max(8, _SELECTIONS_AFTER_INTERRUPT // self.problem.p**2)
+        vertices, arcs, stopped_at = glue(self.known, candidates, self._bounded(effort, few))
+        return self._made((vertices, arcs), self.known.reasons, stopped_at)
+
+    def _follow(self, traced: TracedProblem, effort: Effort) -> Followed:
+        search, _ = self._found()
+        return follow_selections(
+            traced,
+            search.pieces,
+            self._bounded(effort, _BOXES_AFTER_INTERRUPT),
+            known=self.closed.traces,
+            done=self.traces,
+            cut_short=search.stopped is not None,
+        )
 
     def _found(self) -> tuple[IntervalSearch, set[Codes]]:
         """The search and the selections that it left."""
@@ -194,11 +230,7 @@ class PlaneWay:
         return replace(effort, most=few if search.stopped is not None and search.stopped.interrupted else 0)
 
     def _made(
-        self,
-        elements: tuple[Sequence[Vertex], Sequence[Arc]],
-        reasons: Sequence[str],
-        stopped: Stop | None,
-        followed: Followed | None,
+        self, elements: tuple[Sequence[Vertex], Sequence[Arc]], reasons: Sequence[str], stopped: Stop | None
     ) -> Made:
         """Vertices and arcs with what is told of them; there is no proof if the time was over."""
         search, candidates = self._found()
@@ -207,7 +239,7 @@ class PlaneWay:
         if search.checkable and search.pieces and search.stopped is None and all(stop.interrupted for stop in stops):
             given = self.problem, search.interval
             if self.exact is None or self.exact.condensed_exactly:
-                proof = partial(_proof_of_problem, *given, search.pieces, followed)
+                proof = partial(_proof_of_problem, *given, search.pieces, self.followed)
             else:
                 proof = partial(write_graph_proof, *given, "condensed", search.pieces, None)
         stats = GraphStats(
@@ -224,107 +256,19 @@ def not_condensed(reason: StopReason) -> Made:
     return Made((), (), (f"{Stop(reason)} before the body was condensed to its contact nodes",), GraphStats())
 
 
-@dataclass
-class ByAlgebra(PlaneWay):
-    """Arcs as functions of alpha in rationals: nothing stays open but what the time does not suffice for."""
-
-    problem: ContactProblem
-    interval: tuple[Fraction, Fraction]
-    exact: ExactCondensed
-    certifier: IntervalCertifier
-    followed: Followed | None = None
-    known: KnownSelections | None = None
-
-    @classmethod
-    def of(
-        cls,
-        problem: ContactProblem,
-        interval: tuple[Fraction, Fraction],
-        exact: ExactCondensed,
-        arithmetic: Arithmetic,
-    ) -> ByAlgebra:
-        """With the certifier of an arithmetic."""
-        certifier: IntervalCertifier = IntervalCertifier()
-        if not problem.held:
-            certifier = VerifiedIntervalCertifier(problem, None)
-            certifier.checkable = arithmetic == "verified"
-        elif arithmetic == "exact":
-            certifier = ExactIntervalCertifier(exact)
-        elif arithmetic == "verified":
-            certifier = VerifiedIntervalCertifier(problem, exact)
-        return cls(problem, interval, exact, certifier)
-
-    @property
-    def origin(self) -> Fraction | None:
-        """The alpha at which g vanishes."""
-        return self.exact.zero
-
-    def worked_out(self, effort: Effort) -> Made:
-        """Arcs of the selections that were found."""
-        search, candidates = self._found()
-        if self.known is None:
-            a, b = (rational(end) for end in search.interval)
-            self.known = KnownSelections(self.exact, a, b, cut_short=search.stopped is not None)
-        few = max(8, _SELECTIONS_AFTER_INTERRUPT // self.problem.p**2)
-        vertices, arcs, stopped = glue(self.known, candidates, self._bounded(effort, few))
-        return self._made((vertices, arcs), self.known.reasons, stopped, self.followed)
-
-
-class ByBalls(PlaneWay):
-    """Arcs in ball arithmetic; by algebra where balls leave something open and that does not take too long.
-
-    Parameters
-    ----------
-    traced : TracedProblem
-    """
-
-    exact = None
-
-    def __init__(self, traced: TracedProblem) -> None:
-        self.problem, self.interval, self.traced, self.closed = traced.problem, traced.interval, traced, ClosedPieces()
-        self._traces: list[Trace] = []
-        self._algebra: ByAlgebra | None = None
-        self.certifier = VerifiedIntervalCertifier(traced.problem, None, traced.origin if self.problem.held else None)
-
-    @property
-    def origin(self) -> Fraction | None:
-        """The alpha at which g vanishes."""
-        return self.traced.origin
-
-    def close(self, search: IntervalSearch) -> None:
-        """Find pieces that need no tree, while there is time."""
-        if not self.problem.held:
-            return
-        search.closed = self.closed.pieces
-        with suppress(TimeOverError), within(Deadline(search.deadline)):
-            self.closed.find(self.traced)
-
-    def worked_out(self, effort: Effort) -> Made:
-        """Arcs of the selections that were found."""
-        if self._algebra is None:
-            search, candidates = self._found()
-            problem, followed = self.problem, self._followed(effort)
-            joined = followed.joined
-            stopped = search.stopped is not None or followed.stopped is not None
-            large = over() or problem.n > EXACT_DOF_LIMIT or _exact_work(problem, candidates) > LARGEST_EXACT_WORK
-            if (joined.ordered and not joined.open) or stopped or large:
-                return self._made(make_traced(self.traced, joined), followed.reasons, followed.stopped, followed)
-            # several conditions vanish at one alpha, or a selection is singular
-            algebra = ByAlgebra(problem, self.interval, ExactCondensed.from_problem(problem), self.certifier, followed)
-            algebra.search, algebra.candidates = search, candidates
-            self._algebra = algebra
-        return self._algebra.worked_out(effort)
-
-    def _followed(self, effort: Effort) -> Followed:
-        search, _ = self._found()
-        return follow_selections(
-            self.traced,
-            search.pieces,
-            self._bounded(effort, _BOXES_AFTER_INTERRUPT),
-            known=self.closed.traces,
-            done=self._traces,
-            cut_short=search.stopped is not None,
-        )
+def by_algebra(
+    problem: ContactProblem, interval: tuple[Fraction, Fraction], exact: ExactCondensed, arithmetic: Arithmetic
+) -> PlaneWay:
+    """The way without balls, with the certifier of an arithmetic."""
+    certifier = IntervalCertifier()
+    if not problem.held:
+        certifier = VerifiedIntervalCertifier(problem, None)
+        certifier.checkable = arithmetic == "verified"
+    elif arithmetic == "exact":
+        certifier = ExactIntervalCertifier(exact)
+    elif arithmetic == "verified":
+        certifier = VerifiedIntervalCertifier(problem, exact)
+    return PlaneWay(problem, interval, certifier, exact)
 
 
 def way_of(problem: ContactProblem, interval: tuple[Fraction, Fraction], arithmetic: Arithmetic) -> PlaneWay:
@@ -340,9 +284,10 @@ def way_of(problem: ContactProblem, interval: tuple[Fraction, Fraction], arithme
     held, large = problem.held, arithmetic == "verified" and problem.n > FAST_EXACT_DOF
     at_rest = large and held and never_loaded(problem)
     if large and not at_rest and (traced := _traced(problem, interval)) is not None:
-        return ByBalls(traced)
+        certifier = VerifiedIntervalCertifier(problem, None, traced.origin if held else None)
+        return PlaneWay(problem, interval, certifier, traced=traced)
     if held and arithmetic != "exact" and problem.n > (EXACT_DOF_LIMIT if at_rest else FAST_EXACT_DOF):
-        return ByAlgebra.of(problem, interval, ExactCondensed.from_condensed(problem), arithmetic)
+        return by_algebra(problem, interval, ExactCondensed.from_condensed(problem), arithmetic)
     if large and not held and problem.n > EXACT_DOF_LIMIT:
         raise TooLargeError(
             "the stiffness of the body on springs is positive definite only within rounding, and exact algebra takes "
@@ -351,7 +296,7 @@ def way_of(problem: ContactProblem, interval: tuple[Fraction, Fraction], arithme
     exact, size = ExactCondensed.from_problem(problem), 2 * problem.p
     if not problem.on_springs.condensed.definite:
         check_definite(fmpq_mat([list(row[:size]) for row in exact.rows[:size]]))
-    return ByAlgebra.of(problem, interval, exact, arithmetic)
+    return by_algebra(problem, interval, exact, arithmetic)
 
 
 def _exact_work(problem: ContactProblem, candidates: set[Codes]) -> float:

@@ -87,7 +87,7 @@ class Boxes:
         self._waiting: list[_Box] = []
         self._parts = 0
 
-    def add(self, selection: BoxSelection, low: Any, high: Any, said: list[Said], *, precise: bool) -> None:
+    def add(self, selection: BoxSelection, low: object, high: object, said: list[Said], *, precise: bool) -> None:
         """Test a box, at once or together with others; ValueError if it can not be tested at all."""
         if precise:
             expansion = selection.precise.expansion(alpha_number(low), alpha_number(high))

@@ -25,10 +25,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from enumsol.checker.arcs import ArcChecker, ClosedPiece
-from enumsol.checker.reports import MAX_FAILURES, GraphVerificationReport
-from enumsol.condensation.enclosure import CondensedEnclosure, NotEnclosedError
+from enumsol.checker.reports import GraphVerificationReport
+from enumsol.checker.walk import ProofChecker
+from enumsol.condensation.enclosure import CondensedEnclosure
 from enumsol.condensation.unloaded import vanishing_alpha
-from enumsol.errors import InvalidArgumentError, InvalidProblemError
 from enumsol.proof import reading
 from enumsol.support.deadlines import tell
 from enumsol.trusted.exclusion import Leaves, Terms, exclusion_margin, exclusion_margins
@@ -93,7 +93,7 @@ class Piece:
         return codes[of_kind] if kinds else codes
 
 
-class GraphChecker:
+class GraphChecker(ProofChecker):
     """Checks the records of a graph's proof.
 
     Parameters
@@ -107,8 +107,8 @@ class GraphChecker:
     def __init__(
         self, problem: ContactProblem, header: dict[str, Any], progress: Callable[[int], object] | None
     ) -> None:
+        super().__init__()
         self.problem, self.header, self.progress = problem, header, progress
-        self.failures: list[str] = []
         self.pieces = self.leaves = 0
         self.selections: set[bytes] = set()
         self._handed: dict[tuple[int, ...], list[tuple[Fraction, Fraction]]] = {}
@@ -121,12 +121,8 @@ class GraphChecker:
 
     def run(self, records: Iterator[Any]) -> GraphVerificationReport:
         """Check all records after the header."""
-        try:
+        with self.refusing():
             self._check(records)
-        except reading.RefusedError as refusal:
-            self.failures.append(str(refusal))
-        except (NotEnclosedError, InvalidProblemError, InvalidArgumentError) as error:
-            self.failures.append(f"the problem's data cannot be enclosed: {error}")
         return replace(
             self._report(),
             ok=not self.failures,
@@ -164,20 +160,20 @@ class GraphChecker:
         claim = {"pieces": self.pieces, "leaves": self.leaves, "selections": len(self.selections)}
         if self.data == "problem" and isinstance(record, dict) and "force" in record and "piece" not in record:
             origin = self._zero if self._zero is not None and a <= self._zero <= b else None
-            checker = ArcChecker(self.problem, self.enclosure, (a, b), origin, self._handed, self._closed, self._fail)
+            checker = ArcChecker(self.problem, self.enclosure, (a, b), origin, self._handed, self._closed, self.fail)
             record, self._arcs = checker.run(record, records), checker
             claim |= {"traces": checker.traces, "arcs": len(checker.arcs)}
         elif self._closed:
-            self._fail("pieces are said to be decided by their arcs, but there are none")
+            self.fail("pieces are said to be decided by their arcs, but there are none")
         self._check_end(record, claim, "pieces", records)
 
     def _check_end(self, record: object, claim: Mapping[str, int | None], what: str, records: Iterator[Any]) -> None:
         """Compare the counts in the last record with those of what was read."""
         if not reading.same(record, claim):
             found = reading.quoted(record) if isinstance(record, (dict, list)) else "missing"
-            self._fail(f"the counts at the end are {found}; the {what} give {claim!r}")
+            self.fail(f"the counts at the end are {found}; the {what} give {claim!r}")
         if next(records, END) is not END:
-            self._fail("records follow after the end of the proof")
+            self.fail("records follow after the end of the proof")
 
     @cached_property
     def enclosure(self) -> CondensedEnclosure:
@@ -198,11 +194,6 @@ class GraphChecker:
         self.interval = (a, b)
         self._friction = [max(pair) > 0 for pair in zip(*ends, strict=True)]
         return a, b
-
-    def _fail(self, message: str) -> None:
-        self.failures.append(message)
-        if len(self.failures) == MAX_FAILURES:
-            raise reading.RefusedError(f"the check ends after {MAX_FAILURES} failures")
 
     # -- pieces ----------------------------------------------------------------------------------------------------
 
@@ -232,15 +223,15 @@ class GraphChecker:
         _check_repetitions(piece)
         handed = piece.leaves("s")
         if np.any(handed >= CONTACT):
-            self._fail(f"piece {number}: a surviving selection is not complete")
+            self.fail(f"piece {number}: a surviving selection is not complete")
         elif np.any((handed != OPEN) & ((handed == FRICTIONLESS) == np.array(self._friction))):
-            self._fail(f"piece {number}: a surviving selection has a status that a node cannot have")
+            self.fail(f"piece {number}: a surviving selection has a status that a node cannot have")
         if piece.closed is not None:
             if np.any(piece.roots != UNDECIDED) or len(handed) < len(piece.leaves()) or piece.declared is not None:
-                self._fail(f"piece {number}: it is decided by its arcs, but not whole, or has other leaves")
+                self.fail(f"piece {number}: it is decided by its arcs, but not whole, or has other leaves")
             self._closed.append(piece.closed)
         elif not covers(piece.roots, piece.leaves(), self._friction):
-            self._fail(f"piece {number}: its leaves do not cover all selections")
+            self.fail(f"piece {number}: its leaves do not cover all selections")
         self.selections.update(row.tobytes() for row in handed)
         for row in handed.tolist():
             self._handed.setdefault(tuple(row), []).append((piece.a, piece.b))
@@ -294,7 +285,7 @@ class GraphChecker:
         for number in np.flatnonzero(~(margins > 0)):
             # alone it is summed in the order of the search, which may matter for a nearly singular S
             if not exclusion_margin(within, codes[number], *terms[number]) > 0:
-                self._fail(f"leaf {self.leaves + number + 1}: its multipliers do not exclude it")
+                self.fail(f"leaf {self.leaves + number + 1}: its multipliers do not exclude it")
         self.leaves += len(terms)
 
     def _with_form(self, piece: Piece) -> EnclosedPiece:
@@ -382,6 +373,6 @@ def _split(cell: Codes, refinements: Codes, friction: Sequence[bool]) -> int | N
 
 
 def _refines(codes: Codes, coarse: int | Codes) -> Mask:
-    """Which codes are ``coarse`` or refine it."""
+    """Mask of the codes that are ``coarse`` or refine it."""
     held = (coarse == CONTACT) & (codes >= STICK) & (codes <= SLIP_MINUS)
     return np.asarray((codes == coarse) | (coarse == UNDECIDED) | held)

@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from enumsol.checker.reports import MAX_FAILURES, HistoryVerificationReport
-from enumsol.condensation.enclosure import NotEnclosedError, enclosure_of
-from enumsol.errors import InvalidArgumentError, InvalidProblemError
+from enumsol.checker.walk import ProofChecker
+from enumsol.condensation.enclosure import enclosure_of
 from enumsol.model.restart import SlipStart, afresh, restarted
 from enumsol.proof.proof_file import PROOF_VERSION
 from enumsol.proof.reading import RefusedError, numbers_from, quoted, rational_from, same
@@ -30,7 +30,7 @@ _END = object()
 
 @dataclass(frozen=True)
 class _Step:
-    """What a header says of a step."""
+    """A step, as a header describes it."""
 
     alpha: Fraction
     load: Floats | None
@@ -59,11 +59,11 @@ class _Part:
     lines: list[Any]
 
     def records(self) -> Iterator[Any]:
-        """One by one."""
+        """The records one by one."""
         return iter(self.lines)
 
 
-class HistoryChecker:
+class HistoryChecker(ProofChecker):
     """Checks the proof of a history.
 
     Parameters
@@ -77,8 +77,8 @@ class HistoryChecker:
     """
 
     def __init__(self, problem: Any, header: Any, checker: Any, progress: Callable[[int], object] | None) -> None:
+        super().__init__()
         self.problem, self.header, self.checker, self.progress = afresh(problem), header, checker, progress
-        self.failures: list[str] = []
         self.steps: list[_Step] = []
         self.stages: list[_Stage] = []
         self.bases: dict[int, Any] = {}
@@ -92,17 +92,13 @@ class HistoryChecker:
             The content is not a sequence of records.
         """
         complete, unique, within = False, 0, None
-        try:
+        with self.refusing():
             count = self._read_header()
             _ = self.problem.on_springs.enclosure  # made once, for all searches
             for number in range(count):
                 self._stage(number, count, records)
             self._end(count, records)
             complete, unique, within = self._conclusions()
-        except RefusedError as refusal:
-            self.failures.append(str(refusal))
-        except (NotEnclosedError, InvalidProblemError, InvalidArgumentError) as error:
-            self.failures.append(f"the problem's data cannot be enclosed: {error}")
         ok = not self.failures
         numbers = range(1, len(self.steps) + 1)
         stages = tuple(sum(stage.step == k for stage in self.stages) for k in numbers)
@@ -124,7 +120,7 @@ class HistoryChecker:
         """Read the steps; the number of searches."""
         header, problem = self.header, self.problem
         if set(header) != _HEADER or header["format"] != "enumsol-proof" or not same(header["version"], PROOF_VERSION):
-            raise RefusedError("the first record is not the header of a history in an enumsol-proof of version 1")
+            raise RefusedError("the first record is not the header of a history in a proof of this format")
         if header["problem"] != problem.fingerprint or not same(header["p"], problem.p):
             raise RefusedError("the proof belongs to another problem (its fingerprint is different)")
         if not isinstance(header["steps"], list) or not header["steps"] or type(header["stages"]) is not int:

@@ -22,11 +22,10 @@ from enumsol.proof.proof_file import fraction_text
 from enumsol.proof.reading import RefusedError, data_of, friction_at, rational_from, same, units_from
 from enumsol.proof.records import DeclaredForm, Limits, Tree
 from enumsol.trusted.at_alpha import VerifiedSelection, settled_selection
-from enumsol.trusted.confinement import without_bound
 from enumsol.trusted.exclusion import Leaves, Terms, exclusion_margins
-from enumsol.trusted.joint_roots import JointRoot
+from enumsol.trusted.floating_bounds import without_bound
+from enumsol.trusted.joint_roots import JointRoot, told_apart
 from enumsol.trusted.positions import certain_statuses
-from enumsol.trusted.same_roots import told_apart
 from enumsol.trusted.status_rows import (
     ROW_KINDS,
     is_covering,
@@ -151,7 +150,7 @@ class Checker(TreeChecker[EnclosedSystem, "VerifiedSelection | ClosedSolution | 
                 self.fail(f"leaf {number}: its {form}multipliers do not exclude it")
 
     def _excludes(self, leaves: Leaves) -> Mask:
-        """Which assignments hold no solution, if possible without the bound of the rigid displacement."""
+        """Mask of assignments without a solution, if possible without the bound of the rigid displacement."""
         proven = exclusion_margins(self.free, leaves) > 0
         if not self.problem.held and not np.all(proven):
             self.bounded = True
@@ -195,7 +194,7 @@ class Checker(TreeChecker[EnclosedSystem, "VerifiedSelection | ClosedSolution | 
     def _settled(self, system: EnclosedSystem, codes: Codes) -> VerifiedSelection | Unsettled | None:
         return settled_selection(system, codes, self._in_many_digits)
 
-    def _in_many_digits(self, codes: Sequence[int]) -> VerifiedSelection | None:
+    def _in_many_digits(self, codes: Codes) -> VerifiedSelection | None:
         return None if self._precise is None else self._precise.solve(codes)
 
     def _is_root(self, found: object) -> bool:
@@ -306,7 +305,7 @@ class Checker(TreeChecker[EnclosedSystem, "VerifiedSelection | ClosedSolution | 
         return [sum((a * x for a, x in zip(form, numbers, strict=True)), constant) for form, constant in rows]
 
     def _rests_on_reach(self, codes: Codes, points: Sequence[Sequence[Fraction]]) -> bool:
-        """Whether what a selection holds may be other without the bounds of the rigid displacement."""
+        """True if a selection may hold more without the bounds of the rigid displacement."""
         return not self.problem.held and self.rational.rests_on_reach(codes, points)  # type: ignore[attr-defined]
 
     def _excluded_in_rationals(self, codes: Codes, said: kinds.Excluded) -> str | None:

@@ -16,7 +16,7 @@ _MOST_STEPS = 30
 
 @dataclass(frozen=True)
 class VerificationReport:
-    """What the checker found.
+    """Result of checking the proof of a root set.
 
     Attributes
     ----------
@@ -79,7 +79,7 @@ class VerificationReport:
 
 @dataclass(frozen=True)
 class GraphVerificationReport:
-    """What the checker found about a branch graph.
+    """Result of checking the proof of a branch graph.
 
     Attributes
     ----------
@@ -169,7 +169,7 @@ class GraphVerificationReport:
 
 @dataclass(frozen=True)
 class HistoryVerificationReport:
-    """What the checker found about a history.
+    """Result of checking the proof of a history.
 
     Attributes
     ----------

@@ -13,7 +13,7 @@ from enumsol.checker.walk import NO_FORM, Located, TreeChecker
 from enumsol.condensation.data import exactly_at
 from enumsol.condensation.space_condensed import EnclosedSpace
 from enumsol.proof.leaves import Alone, BoxedRoot, Excluded
-from enumsol.proof.reading import RefusedError, data_of, exponents_from, rational_from, shown_alpha
+from enumsol.proof.reading import RefusedError, data_of, rational_from, shown_alpha, units_from
 from enumsol.proof.records import DeclaredForm, Limits, Tree
 from enumsol.trusted.space.boxed_solution import Box, BoxedSolution, apart_in_boxes, is_inside, solution_in_box
 from enumsol.trusted.space.leaves import Open, SpaceRoot, distinct_roots, settle
@@ -27,7 +27,7 @@ if TYPE_CHECKING:
 
     from enumsol.checker.walk import Test
     from enumsol.proof.records import EnclosureRecord, Record
-    from enumsol.support.array_types import Codes, Floats
+    from enumsol.support.array_types import Codes
 
 
 @dataclass
@@ -47,7 +47,7 @@ class SpaceChecker(TreeChecker[EnclosedSpace, "SpaceRoot | LooseSolution"]):
         if self.data != "problem":
             raise RefusedError("a proof about a problem in 3D certifies the problem's own data only")
         try:
-            self.force, self.length = _units(header, self.problem.p)
+            self.force, self.length = units_from(header, self.problem.p, by_node=True)
             self.alpha = rational_from(header.get("alpha"))
             pairs = zip(self.problem.friction, self.problem.friction_slope, strict=True)
             exact = [exactly_at(self.alpha, *pair) for pair in pairs]
@@ -210,11 +210,3 @@ class SpaceChecker(TreeChecker[EnclosedSpace, "SpaceRoot | LooseSolution"]):
 def _name(codes: Codes, found: SpaceRoot | LooseSolution) -> tuple[int, ...]:
     """Name of a root; roots not proven to be one differ in it, for a solution may lie beyond its leaf."""
     return (*codes, int(isinstance(found, LooseSolution)))
-
-
-def _units(header: dict[str, Any], p: int) -> tuple[Floats, Floats]:
-    """Units of forces and displacements of the nodes, powers of two with one product."""
-    force, length = (exponents_from(header.get(key), p) for key in ("force", "length"))
-    if len({a + b for a, b in zip(force, length, strict=True)}) != 1:
-        raise ValueError("the units are not a common scaling of energy")
-    return np.ldexp(1.0, np.array(force)), np.ldexp(1.0, np.array(length))

@@ -33,7 +33,7 @@ from enumsol.checker.reports import GraphVerificationReport
 from enumsol.condensation.data import exactly_at
 from enumsol.condensation.enclosure import CondensedEnclosure
 from enumsol.proof.curve_records import CurvePart, box_from
-from enumsol.proof.reading import RecordError, RefusedError, data_of, exponents_from, numbers_from, quoted, same
+from enumsol.proof.reading import RecordError, RefusedError, data_of, numbers_from, quoted, same, units_from
 from enumsol.proof.records import Limits
 from enumsol.trusted.space.curve_chains import apart, chain_of
 from enumsol.trusted.space.curve_events import CurveMotion
@@ -89,7 +89,7 @@ class SpaceGraphChecker(GraphChecker):
             raise RefusedError("the tree over alpha is missing")
         assert self.interval is not None
         curves = [KnownCurve(given, chain) for chain in self.curves]
-        tree = PieceTreeChecker(enclosure, units, curves, self._fail)
+        tree = PieceTreeChecker(enclosure, units, curves, self.fail)
         tree.run(*self.interval, records)
         self.leaves = tree.leaves
         self.gaps += [gap for chain in self.curves for gap in chain.gaps] + tree.gaps
@@ -148,23 +148,21 @@ class SpaceGraphChecker(GraphChecker):
         for k, one in enumerate(self.curves):
             for other in self.curves[:k]:
                 if not apart(one, other):
-                    self._fail("two curves may be the same")
+                    self.fail("two curves may be the same")
 
 
 def _units_and_steps(
     header: dict[str, Any], problem: ContactProblem3D, interval: tuple[Fraction, Fraction]
 ) -> tuple[tuple[Array, Array], Array]:
     """Units of forces and displacements, and steps of the coordinates."""
-    force, length = (exponents_from(header.get(key), problem.p) for key in ("force", "length"))
-    if len({a + b for a, b in zip(force, length, strict=True)}) != 1:
-        raise ValueError("the units are no common scaling of energy")
+    units = units_from(header, problem.p, by_node=True)
     for pair in zip(problem.friction, problem.friction_slope, strict=True):
         if min(min(exactly_at(end, *pair)) for end in interval) < 0:
             raise ValueError("friction is negative in the interval")
     steps = numbers_from(header.get("steps"), 3 * problem.p + problem.modes.r)
     if not np.all(steps > 0):
         raise ValueError("a step is not positive")
-    return (np.ldexp(1.0, np.array(force)), np.ldexp(1.0, np.array(length))), steps
+    return units, steps
 
 
 def parts_of(problem: AlphaProblem, chain: CurveChain, records: Iterator[Any], limits: Limits) -> list[Run | Turn]:

@@ -1,8 +1,9 @@
-"""What the checkers of root sets share: the walk through a proof's tree, whose leaves cover all selections."""
+"""Base of the checkers of root sets: the walk through a proof's tree, whose leaves cover all selections."""
 
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
+from contextlib import contextmanager
 from dataclasses import dataclass, field
 from functools import cached_property
 from typing import TYPE_CHECKING, Any, ClassVar, Generic, TypeVar
@@ -68,7 +69,36 @@ class Located:
 
 
 @dataclass
-class TreeChecker(ABC, Generic[System, Root]):
+class ProofChecker:
+    """Base of the checkers of one proof: what they found wrong."""
+
+    failures: list[str] = field(default_factory=list, kw_only=True)
+
+    def fail(self, message: str) -> None:
+        """Take note of a failure.
+
+        Raises
+        ------
+        RefusedError
+            There have been MAX_FAILURES: whoever wrote this may have written any number of such leaves.
+        """
+        self.failures.append(message)
+        if len(self.failures) == MAX_FAILURES:
+            raise RefusedError(f"the check ends after {MAX_FAILURES} failures")
+
+    @contextmanager
+    def refusing(self) -> Iterator[None]:
+        """Within this context what makes no sense, or data that cannot be enclosed, end the check as a failure."""
+        try:
+            yield
+        except RefusedError as refusal:
+            self.failures.append(str(refusal))
+        except (NotEnclosedError, InvalidProblemError, InvalidArgumentError) as error:
+            self.failures.append(f"the problem's data cannot be enclosed: {error}")
+
+
+@dataclass
+class TreeChecker(ProofChecker, ABC, Generic[System, Root]):
     """Checks one proof: its header, then the tree alone, then every leaf.
 
     Whatever does not fit together is found before anything is computed, which may take long.
@@ -77,7 +107,6 @@ class TreeChecker(ABC, Generic[System, Root]):
     problem: Any  # in 2D or 3D
     progress: Callable[[int], object] | None
     alpha: Fraction = field(init=False)
-    failures: list[str] = field(default_factory=list)
     regular: int = 0
     undecided: int = 0
     #: undecided parts besides undecided leaves
@@ -114,7 +143,7 @@ class TreeChecker(ABC, Generic[System, Root]):
             The content is not a sequence of records.
         """
         families = isolated = 0
-        try:
+        with self.refusing():
             records = proof.records()
             self._read_header(next(records, None))
             footer = self._survey(records)
@@ -125,10 +154,6 @@ class TreeChecker(ABC, Generic[System, Root]):
             claim = self._claim(isolated, families)
             if not same(footer, claim):
                 self.fail(f"the counts at the end are {quoted(footer)}; the leaves give {claim}")
-        except RefusedError as refusal:
-            self.failures.append(str(refusal))
-        except (NotEnclosedError, InvalidProblemError, InvalidArgumentError) as error:
-            self.failures.append(f"the problem's data cannot be enclosed: {error}")
         return VerificationReport(
             not self.failures,
             tuple(self.failures),
@@ -148,7 +173,7 @@ class TreeChecker(ABC, Generic[System, Root]):
 
     @property
     def tree(self) -> Tree:
-        """What may stand in it: some theorems rest on a stiffness that is positive definite, others on balance."""
+        """Kind of its tree: some theorems rest on a stiffness that is positive definite, others on balance."""
         return self.trees[0 if self.problem.held else 1]
 
     @cached_property
@@ -157,7 +182,7 @@ class TreeChecker(ABC, Generic[System, Root]):
         return self.system if self.problem.held else self._without_bound()
 
     def _either(self, holds: Callable[[System], bool]) -> bool:
-        """Whether something holds of the system, if possible without the bound of the rigid displacement."""
+        """True if something holds of the system, if possible without the bound of the rigid displacement."""
         if holds(self.free):
             return True
         if self.problem.held:
@@ -372,15 +397,3 @@ class TreeChecker(ABC, Generic[System, Root]):
         for name, found in (self.located or {}).items():
             roots.setdefault(self.same.get(name, name), []).extend(found)
         return list(roots.values())
-
-    def fail(self, message: str) -> None:
-        """Take note of a failure.
-
-        Raises
-        ------
-        RefusedError
-            There have been MAX_FAILURES: whoever wrote this may have written any number of such leaves.
-        """
-        self.failures.append(message)
-        if len(self.failures) == MAX_FAILURES:
-            raise RefusedError(f"the check ends after {MAX_FAILURES} failures")

@@ -8,9 +8,6 @@ if TYPE_CHECKING:
 
 __all__ = ["main"]
 
-#: Value of ``ExitStatus.INTERRUPTED``, whose module is loaded below.
-_INTERRUPTED = 130
-
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the command line and return its exit status, also on Ctrl-C while its modules are loaded.
@@ -25,4 +22,4 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
         return run(arguments)
     except KeyboardInterrupt:
-        return _INTERRUPTED
+        return 130  # ExitStatus.INTERRUPTED, whose module may not be loaded

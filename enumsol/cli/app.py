@@ -7,31 +7,27 @@ import re
 import sys
 import warnings
 from collections.abc import Sequence
-from typing import Annotated, Any
+from typing import Annotated, cast
 
 import typer
 
-from enumsol.cli.audit import audit
+from enumsol.cli.audit import audit, verify
 from enumsol.cli.common import ExitStatus
-from enumsol.cli.files import FileCommand
 from enumsol.cli.fixed_point import fixed_point
 from enumsol.cli.follow import follow
 from enumsol.cli.graph import graph, report
 from enumsol.cli.history import history
+from enumsol.cli.options import add_command
 from enumsol.cli.problems import collection_app, gallery_app
 from enumsol.cli.roots import roots
 from enumsol.cli.solve import solve
 from enumsol.cli.streams import guarded_streams, loud_again, say
 from enumsol.cli.table import table
-from enumsol.cli.verify import verify
 from enumsol.errors import EnumsolError, OutputError
 from enumsol.support.messages import listed
 
 #: Raised on options that typer cannot make sense of; it comes with click or with typer, by the version of typer.
 _UsageError: type[Exception] = typer.BadParameter.__bases__[0]
-
-#: Likeness from which an option counts as misspelt: --alpha is no --graph.
-_CLOSE = 0.65
 
 app = typer.Typer(
     name="enumsol",
@@ -42,7 +38,7 @@ app = typer.Typer(
     context_settings={"help_option_names": ["-h", "--help"]},
 )
 for _command in (solve, roots, table, graph, history, report, follow, audit, fixed_point, verify):
-    app.command(_command.__name__.replace("_", "-"), cls=FileCommand)(_command)
+    add_command(app, _command)
 app.add_typer(gallery_app, name="gallery")
 app.add_typer(collection_app, name="collection")
 
@@ -91,21 +87,19 @@ def run(arguments: Sequence[str] | None = None) -> int:
         except EnumsolError as error:
             return _refuse(str(error))
         except _UsageError as error:
-            return _refuse(_in_a_sentence(error))
+            return _refuse(_in_a_sentence(cast("typer.BadParameter", error)))
     return int(status or 0)
 
 
-def _in_a_sentence(error: Any) -> str:
+def _in_a_sentence(error: typer.BadParameter) -> str:
     """Sentence on what typer could not make sense of, and what it would accept."""
-    if (
-        (option := getattr(error, "option_name", None)) is None
-        or error.ctx is None
-        or not hasattr(error, "possibilities")
-    ):
+    option = getattr(error, "option_name", None)
+    if option is None or error.ctx is None or not hasattr(error, "possibilities"):
         # several sentences: "No such command 'rots'. Did you mean 'roots'?"
         return str(error.format_message()).replace(". Did", "; did")
     options = [name for parameter in error.ctx.command.params for name in parameter.opts if name.startswith("--")]
-    close = difflib.get_close_matches(option.lstrip("-"), [name[2:] for name in options], n=1, cutoff=_CLOSE)
+    # likeness from which an option counts as misspelt: --alpha is no --graph
+    close = difflib.get_close_matches(option.lstrip("-"), [name[2:] for name in options], n=1, cutoff=0.65)
     return f"no such option: {option}; " + (
         f"did you mean --{close[0]}?" if close else f"expected some of {listed(options)}"
     )

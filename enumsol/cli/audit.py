@@ -1,16 +1,18 @@
-"""``enumsol audit``: points of a continuation code against the branch graph."""
+"""``enumsol audit`` and ``enumsol verify``: checks of points against the branch graph, and of proofs."""
 
 from __future__ import annotations
 
 import sys
-from typing import TYPE_CHECKING, Annotated, Literal
+from dataclasses import asdict
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import typer
 
 from enumsol.cli.common import ExitStatus, finish, load_problem, parse_alpha, parse_interval, so_far
 from enumsol.cli.graph import build, read_graph
-from enumsol.cli.options import Arithmetic, JsonFile, ProblemArgument, Quiet, csv, file, number
+from enumsol.cli.options import Argument, Arithmetic, Number, OutputFile, Problem, Quiet
 from enumsol.cli.output import deliver
+from enumsol.cli.progress import Display
 from enumsol.errors import InvalidArgumentError
 from enumsol.support.messages import counted
 
@@ -19,45 +21,25 @@ if TYPE_CHECKING:
 
     from enumsol.auditing import AuditReport, PointRun
     from enumsol.branches import BranchGraph
+    from enumsol.checker.reports import GraphVerificationReport, HistoryVerificationReport, VerificationReport
     from enumsol.model.problem3d import AnyProblem
     from enumsol.support.array_types import Alpha
 
 #: As of ``read_points``, which is not imported for --help.
 Columns = Literal["auto", "rows", "labels"]
-PointsArgument = Annotated[
-    str,
-    typer.Argument(
-        metavar="POINTS",
-        help="CSV with the columns alpha, lambda_n_X and lambda_t_X for every contact node X and, for several paths, "
-        "path; - is stdin.",
-        show_default=False,
-    ),
-]
-Tolerance = Annotated[
-    float,
-    typer.Option(
-        metavar="LENGTH",
-        help="Distance from every arc beyond which a point is off the graph, as explained above; dimensionless.",
-    ),
-]
-NamedBy = Annotated[
-    Columns, typer.Option(help="Whether the X of lambda_n_X is the node's row number (from 0) or its label.")
-]
 
 
 def audit(
-    problem: ProblemArgument,
-    points: PointsArgument,
-    first: Annotated[str | None, number("--from", "First alpha; default: that of the points.")] = None,
-    last: Annotated[str | None, number("--to", "Last alpha; default: that of the points.")] = None,
-    graph_file: Annotated[
-        str | None, file("--graph", "A graph written by enumsol graph --save.", None, "GRAPH")
-    ] = None,
-    arithmetic: Annotated[Arithmetic, typer.Option(help="Arithmetic of the graph, as in enumsol graph.")] = "verified",
-    tolerance: Tolerance = 1e-5,
-    columns: NamedBy = "auto",
-    json_file: JsonFile = None,
-    csv_file: Annotated[str | None, csv("point")] = None,
+    problem: Problem,
+    points: Argument,
+    first: Number | None = None,
+    last: Number | None = None,
+    graph_file: Annotated[str | None, typer.Option(metavar="GRAPH")] = None,
+    arithmetic: Arithmetic = "verified",
+    tolerance: Annotated[float, typer.Option(metavar="LENGTH")] = 1e-5,
+    columns: Columns = "auto",
+    json_file: OutputFile | None = None,
+    csv_file: OutputFile | None = None,
     quiet: Quiet = False,
 ) -> None:
     """Check POINTS, from any continuation code, against all solutions of PROBLEM.
@@ -83,6 +65,18 @@ def audit(
     not compared, whatever else was found, because their alpha is outside the interval of the graph, or because a graph
     that is known to be incomplete has no arc there; 2 on bad input; 130 on Ctrl-C; 74 if a result could not be written;
     141 if the program that read it has ended.
+
+    Parameters
+    ----------
+    points : CSV with the columns alpha, lambda_n_X and lambda_t_X for every contact node X and, for several paths,
+        path; - is stdin.
+    first : First alpha; default: that of the points.
+    last : Last alpha; default: that of the points.
+    graph_file : A graph written by enumsol graph --save.
+    arithmetic : Arithmetic of the graph, as in enumsol graph.
+    tolerance : Distance from every arc beyond which a point is off the graph, as explained above; dimensionless.
+    columns : Whether the X of lambda_n_X is the node's row number (from 0) or its label.
+    csv_file : Write a table with one row per point; - is stdout.
     """
     from enumsol.auditing import audit as check  # numpy and scipy: not for --help
     from enumsol.auditing.graph_map import checked_tolerance
@@ -138,3 +132,55 @@ def _interval(runs: Sequence[PointRun], first: str | None, last: str | None) -> 
             f"alpha goes from {float(low):g} to {float(high):g}; expected an interval, by --from and --to"
         )
     return low, high
+
+
+# -- proofs ----------------------------------------------------------------------------------------------------------
+
+#: What the checker tells of itself, and which part of the bar is its: a root set has leaves, a graph an interval and
+#: selections that were followed, a history a search for every start.
+_STEPS = {
+    "leaves": (0.0, 1.0),
+    "per cent of the interval": (0.0, 0.5),
+    "selections followed": (0.5, 1.0),
+    "searches": (0.0, 1.0),
+}
+
+
+def verify(problem: Problem, proof: Argument, json_file: OutputFile | None = None, quiet: Quiet = False) -> None:
+    """Check the PROOF that a list of roots of PROBLEM, a branch graph or a history is complete.
+
+    The checker imports nothing from the search: it computes the condensed problem anew and checks every leaf of the
+    search tree. It uses the same rigorous bounds; python -m pydoc enumsol.checker lists what the two share.
+
+    Exit status: 0 if the proof holds and nothing is undecided; 3 if it holds but leaves selections undecided or, for a
+    graph, holds no arcs or leaves parts of them undecided; 2 if it does not hold or cannot be read; 74 if the report
+    could not be written; 141 if the program that read it has ended.
+
+    Parameters
+    ----------
+    proof : A file written by --proof of enumsol roots, graph or history.
+    """
+    # numpy and scipy: not for --help
+    from enumsol.checker.verify import verify as check
+    from enumsol.proof.proof_file import Proof
+
+    body = load_problem(problem)
+    with Display("checking", _STEPS):
+        report = check(body, Proof.load(proof))
+    about = {"problem": problem, "proof": proof, "fingerprint": body.fingerprint}
+    deliver(
+        json_file=json_file,
+        text=lambda: repr(report),
+        content=lambda: {**about, **_content(report)},
+    )
+    if not report.ok:
+        raise typer.Exit(ExitStatus.BAD_INPUT)
+    raise typer.Exit(ExitStatus.DONE if report.complete else ExitStatus.INCOMPLETE)
+
+
+def _content(report: VerificationReport | GraphVerificationReport | HistoryVerificationReport) -> dict[str, Any]:
+    """The report, for JSON; of a graph the number of its selections."""
+    content = asdict(report) | {"complete": report.complete}
+    if "selections" in content and not isinstance(content["selections"], int):
+        content["selections"] = len(content["selections"])
+    return content

@@ -32,8 +32,6 @@ GALLERY, COLLECTION = "gallery:", "collection:"
 TOML = ".toml"
 #: Usual endings of files that meshio reads and that are no problems.
 MESHES = (".msh", ".vtu", ".vtk", ".inp", ".xdmf", ".med", ".bdf", ".mesh", ".e", ".exo")
-#: As many processes as Windows lets one wait for.
-_MOST_ON_WINDOWS = 61
 
 
 class ExitStatus(enum.IntEnum):
@@ -258,7 +256,7 @@ def capped(jobs: int) -> int:
     """Number of processes, at most as many as there are processors: more of them only take memory."""
     most = processors()
     if sys.platform == "win32":
-        most = min(most, _MOST_ON_WINDOWS)
+        most = min(most, 61)  # as many as Windows lets one wait for
     if jobs > most:
         note(f"--jobs is {jobs}; {most} {'are' if most > 1 else 'is'} used, as many as this machine can keep busy")
     return min(jobs, most)

@@ -8,7 +8,7 @@ import typer
 
 from enumsol.cli import output
 from enumsol.cli.common import ExitStatus, finish, in_units, load_problem, parse_alpha, so_far, units_of
-from enumsol.cli.options import JsonFile, ProblemArgument, Quiet, Units, VtuFile, count, csv, file, number
+from enumsol.cli.options import Count, Number, OutputFile, Problem, Quiet, Units
 from enumsol.cli.progress import Display
 from enumsol.errors import InvalidArgumentError
 
@@ -23,28 +23,17 @@ _RIGID = ("rigid_coordinates", "rigid_displacement", "free_motion")
 
 
 def fixed_point(
-    problem: ProblemArgument,
-    alpha: Annotated[
-        str | None,
-        number("--alpha", "Parameter value: a number or a fraction; may be omitted if nothing depends on it."),
-    ] = None,
-    start: Annotated[
-        float | None,
-        typer.Option(
-            metavar="FORCE",
-            help="Initial slip bound of every node, by default 0; of a body that nothing holds all nodes stick then.",
-        ),
-    ] = None,
-    tolerance: Annotated[
-        float, typer.Option(help="Size of a step, relative to the load, at which the iteration has converged.")
-    ] = 1e-10,
-    max_iterations: Annotated[int, count("Largest number of Tresca problems that are solved.")] = 1000,
-    anderson: Annotated[int, typer.Option(min=0, metavar="N", help="Mix the last N steps (Anderson).")] = 0,
-    json_file: JsonFile = None,
-    csv_file: Annotated[str | None, csv("contact node")] = None,
-    npz_file: Annotated[str | None, file("--npz", "Write all arrays, for FixedPoint.load.")] = None,
-    vtu_file: VtuFile = None,
-    units: Units = None,
+    problem: Problem,
+    alpha: Number | None = None,
+    start: Annotated[float | None, typer.Option(metavar="FORCE")] = None,
+    tolerance: float = 1e-10,
+    max_iterations: Count = 1000,
+    anderson: Annotated[int, typer.Option(min=0, metavar="N")] = 0,
+    json_file: OutputFile | None = None,
+    csv_file: OutputFile | None = None,
+    npz_file: OutputFile | None = None,
+    vtu_file: OutputFile | None = None,
+    units: Units | None = None,
     quiet: Quiet = False,
 ) -> None:
     """Find one solution of PROBLEM at one ALPHA, as the limit of contact problems with given slip bounds.
@@ -56,6 +45,16 @@ def fixed_point(
     Exit status: 0 if the iteration converged; 3 if not; 2 on bad input; 130 on
     Ctrl-C, after printing the last iterate; 74 if a result could not be written; 141 if the program that read it has
     ended.
+
+    Parameters
+    ----------
+    alpha : Parameter value: a number or a fraction; may be omitted if nothing depends on it.
+    start : Initial slip bound of every node, by default 0; of a body that nothing holds all nodes stick then.
+    tolerance : Size of a step, relative to the load, at which the iteration has converged.
+    max_iterations : Largest number of Tresca problems that are solved.
+    anderson : Mix the last N steps (Anderson).
+    csv_file : Write a table with one row per contact node; - is stdout.
+    npz_file : Write all arrays, for FixedPoint.load.
     """
     body, names = load_problem(problem), units_of(problem, units)
     value = _alpha(alpha, problem, body)
@@ -94,12 +93,11 @@ def _alpha(text: str | None, name: str, body: AnyProblem) -> Alpha:
 def _approximate(body: AnyProblem, alpha: Alpha, start: float | None, options: dict[str, Any]) -> FixedPoint:
     from enumsol.fixed_points import successive_approximations  # numpy and scipy: not for --help
 
-    with Display("iterating") as display:
+    def told(state: FixedPointProgress) -> tuple[float, str]:
+        return min(1.0, 1.0 / max(state.increment, 1e-300)), f"iteration {state.iteration}"
 
-        def show(state: FixedPointProgress) -> None:
-            display.show(min(1.0, 1.0 / max(state.increment, 1e-300)), f"iteration {state.iteration}")
-
-        return successive_approximations(body, alpha, start, progress=show, **options)
+    with Display("iterating", told=told) as display:
+        return successive_approximations(body, alpha, start, progress=display, **options)
 
 
 def _content(found: FixedPoint, name: str) -> dict[str, Any]:

@@ -11,7 +11,7 @@ from enumsol.cli import options
 from enumsol.cli.common import ExitStatus, finish, load_problem, node_row, parse_alpha, parse_interval, units_of
 from enumsol.cli.graph import read_graph
 from enumsol.cli.output import deliver, taken, write_figure
-from enumsol.cli.progress import Display, SearchDisplay
+from enumsol.cli.progress import Display, search_display
 from enumsol.errors import Interrupted, InvalidArgumentError, OutOfMemoryError
 from enumsol.support.messages import counted
 
@@ -26,57 +26,34 @@ if TYPE_CHECKING:
     from enumsol.roots.root import Root
     from enumsol.support.array_types import Alpha
 
-OneRoot = Annotated[
-    int | None, typer.Option(min=0, metavar="K", help="Start from root K of enumsol roots; default: from all roots.")
-]
-Direction = Annotated[
-    str,
-    typer.Option(metavar="+1|-1|both", help="+1: positive orientation, in which alpha grows where the index is +1."),
-]
-OneTangent = Annotated[
-    int | None, typer.Option(min=0, metavar="K", help="Start along the K-th of several tangents at a degenerate root.")
-]
-CheckSteps = Annotated[
-    bool,
-    options.step(
-        None, "Refuse steps that may have left the branch. Otherwise the algorithm runs as printed in the paper."
-    ),
-]
-#: In 3D, forces that are as near to each other, relative to the largest, belong to one root.
-_SAME_ROOT = 1e-7
+#: Options of the steps of a continuation.
+Step = Annotated[float, typer.Option(metavar="LENGTH", rich_help_panel=options.STEPS)]
 #: Ends of a path at which nothing is left to follow.
 _ARRIVED = ("interval left", "closed")
 
 
 def follow(
-    problem: options.ProblemArgument,
-    first: options.FirstAlpha,
-    last: options.LastAlpha,
-    start: Annotated[str, options.number("--start", "Alpha at which the starts are enumerated.")],
-    root: OneRoot = None,
-    direction: Direction = "both",
-    tangent: OneTangent = None,
-    arithmetic: Annotated[
-        options.Arithmetic, typer.Option(help="Arithmetic of the enumeration of the starts.")
-    ] = "verified",
-    h_max: Annotated[float, options.step("LENGTH", "Longest step.")] = 1.0,
-    h_min: Annotated[float, options.step("LENGTH", "Shortest step.")] = 1e-5,
-    h_init: Annotated[float | None, options.step("LENGTH", "First step; default: 0.05, or h-max.")] = None,
-    eps: Annotated[float, options.step("NORM", "Convergence tolerance of the corrections.")] = 1e-6,
-    max_steps: Annotated[int, options.count("Stop a path after N steps.", panel=options.STEPS)] = 5000,
-    check_steps: CheckSteps = True,
-    json_file: options.JsonFile = None,
-    csv_file: Annotated[str | None, options.csv("point, for enumsol audit")] = None,
-    plot_file: options.PlotFile = None,
-    graph_file: Annotated[
-        str | None,
-        options.file(
-            "--graph", "Draw the paths over this graph, written by enumsol graph --save.", options.PLOT, "GRAPH"
-        ),
-    ] = None,
-    quantity: options.DrawnQuantity = "lambda_n",
-    label: Annotated[str | None, options.node("--node", "LABEL", "Contact node to draw; default: the first.")] = None,
-    units: options.Units = None,
+    problem: options.Problem,
+    first: options.Number,
+    last: options.Number,
+    start: options.Number,
+    root: Annotated[int | None, typer.Option(min=0, metavar="K")] = None,
+    direction: Annotated[str, typer.Option(metavar="+1|-1|both")] = "both",
+    tangent: Annotated[int | None, typer.Option(min=0, metavar="K")] = None,
+    arithmetic: options.Arithmetic = "verified",
+    h_max: Step = 1.0,
+    h_min: Step = 1e-5,
+    h_init: Step | None = None,
+    eps: Annotated[float, typer.Option(metavar="NORM", rich_help_panel=options.STEPS)] = 1e-6,
+    max_steps: Annotated[int, typer.Option(min=1, metavar="N", rich_help_panel=options.STEPS)] = 5000,
+    check_steps: Annotated[bool, typer.Option("--check-steps/--no-check-steps", rich_help_panel=options.STEPS)] = True,
+    json_file: options.OutputFile | None = None,
+    csv_file: options.OutputFile | None = None,
+    plot_file: options.PlotFile | None = None,
+    graph_file: Annotated[str | None, typer.Option(metavar="GRAPH", rich_help_panel=options.PLOT)] = None,
+    quantity: options.Quantity = "lambda_n",
+    node: Annotated[str | None, typer.Option(metavar="LABEL", rich_help_panel=options.PLOT)] = None,
+    units: options.Units | None = None,
     quiet: options.Quiet = False,
 ) -> None:
     """Follow branches of solutions of PROBLEM, in 2D or 3D, from its roots at one alpha.
@@ -87,6 +64,24 @@ def follow(
     Exit status: 0 if every path left the interval or closed; 3 if a path ended otherwise or could not start; 2 on bad
     input; 130 on Ctrl-C, after printing the paths so far; 74 if a result could not be written; 141 if the program that
     read it has ended.
+
+    Parameters
+    ----------
+    start : Alpha at which the starts are enumerated.
+    root : Start from root K of enumsol roots; default: from all roots.
+    direction : +1: positive orientation, in which alpha grows where the index is +1.
+    tangent : Start along the K-th of several tangents at a degenerate root.
+    arithmetic : Arithmetic of the enumeration of the starts.
+    h_max : Longest step.
+    h_min : Shortest step.
+    h_init : First step; default: 0.05, or h-max.
+    eps : Convergence tolerance of the corrections.
+    max_steps : Stop a path after N steps.
+    check_steps : Refuse steps that may have left the branch. Otherwise the algorithm runs as printed in the paper.
+    csv_file : Write a table with one row per point, for enumsol audit; - is stdout.
+    graph_file : Draw the paths over this graph, written by enumsol graph --save.
+    quantity : Quantity drawn against alpha.
+    node : Contact node to draw; default: the first.
     """
     from enumsol.continuation import ContinuationOptions  # numpy: not for --help
 
@@ -105,7 +100,7 @@ def follow(
     )
     interval, alpha, signs = parse_interval(first, last), parse_alpha(start, "--start"), _directions(direction)
     names, body = units_of(problem, units), load_problem(problem)
-    row = node_row(body, label)
+    row = node_row(body, node)
     over = None if graph_file is None else read_graph(graph_file, body)
     followed = _Followed(body, (float(interval[0]), float(interval[1])), steps, tangent)
     ended: Interrupted | OutOfMemoryError | None = None
@@ -146,7 +141,7 @@ def _starts(
         raise InvalidArgumentError(f"--start is {float(alpha):g}; expected an alpha between {low:g} and {high:g}")
     from enumsol.roots.enumerate import enumerate_roots  # numpy and scipy: not for --help
 
-    with SearchDisplay() as display:
+    with search_display() as display:
         found = enumerate_roots(problem, alpha, arithmetic, progress=display)
     count = len(found)
     if not count:
@@ -231,12 +226,10 @@ class _Followed:
         """Points of all paths, with the columns path, root and direction."""
         import pandas as pd
 
-        frames = []
-        for k, (root, sign, path) in enumerate(self.found):
-            one = path.to_frame()
-            for at, (name, value) in enumerate((("path", k), ("root", root), ("direction", sign))):
-                one.insert(at, name, value)
-            frames.append(one)
+        frames = [
+            pd.DataFrame({"path": k, "root": root, "direction": sign, **path.to_frame()})
+            for k, (root, sign, path) in enumerate(self.found)
+        ]
         return pd.concat(frames, ignore_index=True) if frames else pd.DataFrame(columns=["path", "alpha"])
 
     def content(self) -> dict[str, Any]:
@@ -282,7 +275,8 @@ def _leads_to(path: Path, k: int, root: Root, problem: AnyProblem) -> bool:
         found = newton(problem, root.alpha, (1 - share) * forces[0] + share * forces[1])
     except NotConverged:
         return False
-    near = _SAME_ROOT * max(float(np.max(np.abs(forces))), float(np.max(np.abs(root.lambda_n))))
+    # forces that are as near to each other belong to one root
+    near = 1e-7 * max(float(np.max(np.abs(forces))), float(np.max(np.abs(root.lambda_n))))
     return all(
         np.max(np.abs(one - other)) <= near
         for one, other in ((found.lambda_n, root.lambda_n), (found.lambda_t, root.lambda_t))

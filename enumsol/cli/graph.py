@@ -4,13 +4,12 @@ from __future__ import annotations
 
 import shlex
 from importlib.util import find_spec
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import typer
 
 from enumsol.cli import common, options, output
 from enumsol.cli.common import load_problem, node_row, parse_interval, so_far, title_of, units_of
-from enumsol.cli.options import csv, file
 from enumsol.cli.progress import Display
 from enumsol.errors import InvalidArgumentError, MissingDependencyError
 
@@ -20,40 +19,27 @@ if TYPE_CHECKING:
     from enumsol.support.array_types import Alpha
 
 
-HowExact = Annotated[
-    options.Arithmetic,
-    typer.Option(
-        help="verified: rigorous error bounds, with proof. fast: the search trusts floats, never proven. "
-        "exact: rationals throughout, with proof, slow beyond ten contact nodes."
-    ),
-]
+#: Quantities of a figure: overviews, and those of nodes.
+Overview = Literal["norm", "sum_n", "sum_t", "lambda_n", "lambda_t", "u_n", "u_t"]
 
 
 def graph(
-    problem: options.ProblemArgument,
-    first: options.FirstAlpha,
-    last: options.LastAlpha,
-    arithmetic: HowExact = "verified",
-    max_nodes: options.MaxNodes = None,
-    time_limit: options.TimeLimit = None,
-    jobs: options.Jobs = 1,
-    save_file: Annotated[str | None, file("--save", "Write the graph, for enumsol audit and follow.")] = None,
-    json_file: options.JsonFile = None,
-    csv_file: Annotated[str | None, csv("arc")] = None,
-    proof_file: Annotated[str | None, file("--proof", "Write the proof (verified), for enumsol verify.")] = None,
-    graphml_file: Annotated[str | None, file("--graphml", "Write GraphML for other programs.")] = None,
-    plot_file: options.PlotFile = None,
-    quantity: Annotated[
-        options.Overview | None,
-        typer.Option(
-            help="Quantity drawn against alpha: an overview (default: norm of the contact forces), or one of nodes.",
-            rich_help_panel=options.PLOT,
-        ),
-    ] = None,
-    nodes: Annotated[
-        str | None, options.node("--nodes", "LABELS", "Contact nodes to draw, such as 0,3; default: up to three.")
-    ] = None,
-    units: options.Units = None,
+    problem: options.Problem,
+    first: options.Number,
+    last: options.Number,
+    arithmetic: options.Arithmetic = "verified",
+    max_nodes: options.Count | None = None,
+    time_limit: options.Seconds | None = None,
+    jobs: options.Count = 1,
+    save_file: options.OutputFile | None = None,
+    json_file: options.OutputFile | None = None,
+    csv_file: options.OutputFile | None = None,
+    proof_file: options.OutputFile | None = None,
+    graphml_file: options.OutputFile | None = None,
+    plot_file: options.PlotFile | None = None,
+    quantity: Annotated[Overview | None, typer.Option(rich_help_panel=options.PLOT)] = None,
+    nodes: Annotated[str | None, typer.Option(metavar="LABELS", rich_help_panel=options.PLOT)] = None,
+    units: options.Units | None = None,
     quiet: options.Quiet = False,
 ) -> None:
     """Find all solutions of PROBLEM for every alpha of an interval, as branches of arcs.
@@ -64,6 +50,17 @@ def graph(
     Exit status: 0 if the graph is complete (in fast arithmetic, which proves nothing: if the degrees balance at every
     vertex); 3 if the graph is known to be incomplete; 2 on bad input; 130 on Ctrl-C, after printing the graph so far;
     74 if a result could not be written; 141 if the program that read it has ended.
+
+    Parameters
+    ----------
+    arithmetic : verified: rigorous error bounds, with proof. fast: the search trusts floats, never proven. exact:
+        rationals throughout, with proof, slow beyond ten contact nodes.
+    save_file : Write the graph, for enumsol audit and follow.
+    csv_file : Write a table with one row per arc; - is stdout.
+    proof_file : Write the proof (verified), for enumsol verify.
+    graphml_file : Write GraphML for other programs.
+    quantity : Quantity drawn against alpha: an overview (default: norm of the contact forces), or one of nodes.
+    nodes : Contact nodes to draw, such as 0,3; default: up to three.
     """
     interval, body = parse_interval(first, last), load_problem(problem)
     chosen = None if nodes is None else [body.node_ids[node_row(body, label.strip())] for label in nodes.split(",")]
@@ -92,21 +89,20 @@ def graph(
 
 
 def report(
-    problem: options.ProblemArgument,
-    first: options.FirstAlpha,
-    last: options.LastAlpha,
+    problem: options.Problem,
+    first: options.Number,
+    last: options.Number,
     page_file: Annotated[
-        str,
-        typer.Option("--output", "-o", metavar="FILE", help="File of the page, .html.", rich_help_panel=options.OUTPUT),
+        str, typer.Option("--output", "-o", metavar="FILE", rich_help_panel=options.OUTPUT)
     ] = "report.html",
-    arithmetic: HowExact = "verified",
-    max_nodes: options.MaxNodes = None,
-    time_limit: options.TimeLimit = None,
-    jobs: options.Jobs = 1,
-    title: options.Title = None,
-    units: options.Units = None,
-    proof_file: Annotated[str | None, file("--proof", "Write the proof (verified), to pass on with the page.")] = None,
-    json_file: options.JsonFile = None,
+    arithmetic: options.Arithmetic = "verified",
+    max_nodes: options.Count | None = None,
+    time_limit: options.Seconds | None = None,
+    jobs: options.Count = 1,
+    title: options.Title | None = None,
+    units: options.Units | None = None,
+    proof_file: options.OutputFile | None = None,
+    json_file: options.OutputFile | None = None,
     quiet: options.Quiet = False,
 ) -> None:
     """Find all solutions of PROBLEM for every alpha of an interval, and write one HTML page about them.
@@ -116,6 +112,13 @@ def report(
     prints.
 
     Exit status: as enumsol graph. If the graph is not complete, the page is written all the same and says so.
+
+    Parameters
+    ----------
+    page_file : File of the page, .html.
+    arithmetic : verified: rigorous error bounds, with proof. fast: the search trusts floats, never proven. exact:
+        rationals throughout, with proof, slow beyond ten contact nodes.
+    proof_file : Write the proof (verified), to pass on with the page.
     """
     if find_spec("plotly") is None:
         raise MissingDependencyError.of("reports", "plotly", "report")
@@ -175,12 +178,9 @@ def build(
     """
     from enumsol.branches import branch_graph
 
-    with common.workers(jobs) as executor, Display("branch graph") as display:
-
-        def progress(stage: str, share: float) -> None:
-            display.show(share, *_STEPS[stage])
-
-        return branch_graph(problem, interval, arithmetic, progress=progress, executor=executor, **limits)
+    told = lambda stage, share: (share, *_STEPS[stage])  # noqa: E731
+    with common.workers(jobs) as executor, Display("branch graph", told=told) as display:
+        return branch_graph(problem, interval, arithmetic, progress=display, executor=executor, **limits)
 
 
 def read_graph(file: str, problem: AnyProblem) -> BranchGraph:
@@ -194,22 +194,9 @@ def read_graph(file: str, problem: AnyProblem) -> BranchGraph:
     from enumsol.branches import BranchGraph
 
     found = BranchGraph.load(file)
-    if not isinstance(found.problem, type(problem)) or not _same_problem(found.problem, problem):
+    if found.problem.fingerprint != problem.fingerprint:
         raise InvalidArgumentError(f"--graph is {file}, a graph of another problem; expected one of PROBLEM")
     return found
-
-
-def _same_problem(a: AnyProblem, b: AnyProblem) -> bool:
-    import numpy as np  # not for --help
-
-    plane = hasattr(a, "Bt")
-    rows = ("A", "Bn", "Bt") if plane else ("A", "Bn", "Bt1", "Bt2")
-    if (a.n, a.p) != (b.n, b.p) or any((getattr(a, name) != getattr(b, name)).nnz for name in rows):
-        return False
-    pairs = [(getattr(a, name), getattr(b, name)) for name in ("f", "gap", "slip_offset")]
-    frictions = zip(a.affine_friction, b.affine_friction, strict=True)
-    slopes = [np.zeros(a.n) if item.load_slope is None else item.load_slope for item in (a, b)]
-    return all(np.array_equal(x, y) for x, y in [*pairs, *frictions, tuple(slopes)])
 
 
 def graph_as_text(found: BranchGraph) -> str:

@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import typer
 
-from enumsol.cli import common, options, output
-from enumsol.cli.options import axis, count, csv, file
+from enumsol.cli import common, output
+from enumsol.cli.options import PLOT, Arithmetic, Count, OutputFile, PlotFile, Problem, Quiet, Seconds, Title, Units
 from enumsol.cli.progress import Display
 from enumsol.errors import InvalidArgumentError
 from enumsol.support.messages import counted
@@ -18,56 +18,33 @@ if TYPE_CHECKING:
     from enumsol.loading.history import History
     from enumsol.model.problem3d import AnyProblem
 
-Drawn = Literal["step", "alpha", "displacement", "lambda_n", "lambda_t", "dissipated"]
+Drawn = Annotated[
+    Literal["step", "alpha", "displacement", "lambda_n", "lambda_t", "dissipated"], typer.Option(rich_help_panel=PLOT)
+]
 
 
 def history(
-    problem: options.ProblemArgument,
-    steps: Annotated[
-        str | None,
-        typer.Option(
-            metavar="STEPS",
-            help="A CSV file with the columns alpha, friction or f0, f1, ...; or a list of alphas such as 0,1/2,1,0. "
-            "Default: the key steps of a .toml PROBLEM.",
-            show_default=False,
-        ),
-    ] = None,
-    arithmetic: Annotated[
-        options.Arithmetic,
-        typer.Option(
-            help="verified: rigorous error bounds, with proof. fast: floats and a tolerance, never proven. "
-            "exact: rationals throughout, for small problems in 2D."
-        ),
-    ] = "verified",
-    follow: Annotated[
-        Literal["all", "nearest"], typer.Option(help="Which roots of a step start the next one: all, or the nearest.")
-    ] = "all",
-    merge: Annotated[
-        float | None,
-        typer.Option(
-            metavar="LENGTH", help="Join ends whose contact nodes are at most this far apart.", show_default=False
-        ),
-    ] = None,
-    refine: Annotated[
-        bool, typer.Option("--refine", help="Halve the increments until the statuses no longer change.")
-    ] = False,
-    max_branches: Annotated[int | None, count("Follow at most N different ends of a step.")] = None,
-    max_nodes: options.MaxNodes = None,
-    time_limit: options.TimeLimit = None,
-    jobs: options.Jobs = 1,
-    proof_file: Annotated[str | None, file("--proof", "Write one proof of the whole history (verified).")] = None,
-    save: Annotated[str | None, file("--save", "Write the history for History.load.")] = None,
-    report: Annotated[
-        str | None, file("--report", "Write an HTML page with the tree, the figures and the bodies.")
-    ] = None,
-    json_file: options.JsonFile = None,
-    csv_file: Annotated[str | None, csv("root")] = None,
-    plot: options.PlotFile = None,
-    x: Annotated[Drawn, axis("--x", "Quantity on the horizontal axis.")] = "displacement",
-    y: Annotated[Drawn, axis("--y", "Quantity on the vertical axis.")] = "alpha",
-    units: options.Units = None,
-    title: options.Title = None,
-    quiet: options.Quiet = False,
+    problem: Problem,
+    steps: Annotated[str | None, typer.Option(metavar="STEPS", show_default=False)] = None,
+    arithmetic: Arithmetic = "verified",
+    follow: Literal["all", "nearest"] = "all",
+    merge: Annotated[float | None, typer.Option(metavar="LENGTH", show_default=False)] = None,
+    refine: bool = False,
+    max_branches: Count | None = None,
+    max_nodes: Count | None = None,
+    time_limit: Seconds | None = None,
+    jobs: Count = 1,
+    proof_file: OutputFile | None = None,
+    save_file: OutputFile | None = None,
+    report_file: OutputFile | None = None,
+    json_file: OutputFile | None = None,
+    csv_file: OutputFile | None = None,
+    plot_file: PlotFile | None = None,
+    x: Drawn = "displacement",
+    y: Drawn = "alpha",
+    units: Units | None = None,
+    title: Title | None = None,
+    quiet: Quiet = False,
 ) -> None:
     """Find all histories of solutions of PROBLEM over a sequence of loads.
 
@@ -78,6 +55,23 @@ def history(
     missing); 3 if something remained undecided, a limit ended it or roots were not followed; 2 on bad input; 130 on
     Ctrl-C, after printing what was found so far; 74 if a result could not be written; 141 if the program that read it
     has ended.
+
+    Parameters
+    ----------
+    steps : A CSV file with the columns alpha, friction or f0, f1, ...; or a list of alphas such as 0,1/2,1,0. Default:
+        the key steps of a .toml PROBLEM.
+    arithmetic : verified: rigorous error bounds, with proof. fast: floats and a tolerance, never proven. exact:
+        rationals throughout, for small problems in 2D.
+    follow : Which roots of a step start the next one: all, or the nearest.
+    merge : Join ends whose contact nodes are at most this far apart.
+    refine : Halve the increments until the statuses no longer change.
+    max_branches : Follow at most N different ends of a step.
+    proof_file : Write one proof of the whole history (verified).
+    save_file : Write the history for History.load.
+    report_file : Write an HTML page with the tree, the figures and the bodies.
+    csv_file : Write a table with one row per root; - is stdout.
+    x : Quantity on the horizontal axis.
+    y : Quantity on the vertical axis.
     """
     if proof_file is not None and arithmetic != "verified":
         raise InvalidArgumentError(f"--proof is given with {arithmetic} arithmetic; expected verified")
@@ -93,9 +87,9 @@ def history(
 
     output.deliver(
         (proof_file, lambda path: _write_proof(found, path)),
-        (save, found.save),
-        (report, write_page),
-        (plot, lambda path: output.write_figure(path, found.plot(x, y, units=names))),
+        (save_file, found.save),
+        (report_file, write_page),
+        (plot_file, lambda path: output.write_figure(path, found.plot(x, y, units=names))),
         json_file=json_file,
         csv_file=csv_file,
         text=lambda: found.text(names),
@@ -105,25 +99,19 @@ def history(
     common.finish(ended, common.ExitStatus.INCOMPLETE if found.reasons else common.ExitStatus.DONE)
 
 
-def _search(problem: AnyProblem, steps: Any, jobs: int, options: dict[str, Any]) -> History:
+def _search(problem: AnyProblem, steps: object, jobs: int, options: dict[str, Any]) -> History:
     from enumsol.loading.growing import histories  # numpy and scipy: not for --help
 
-    with common.workers(jobs) as executor, _HistoryDisplay() as display:
+    with common.workers(jobs) as executor, Display("stepping", told=_told) as display:
         return histories(problem, steps, executor=executor, progress=display, **options)
 
 
-class _HistoryDisplay(Display):
-    """Progress of a history."""
-
-    def __init__(self) -> None:
-        super().__init__("stepping")
-
-    def __call__(self, state: HistoryProgress) -> None:
-        """Show where the history is."""
-        of_step = state.stages / (state.stages + state.waiting)
-        share = (state.step - 1 + of_step) / state.steps
-        left, roots = counted(state.waiting, "start"), counted(state.roots, "root")
-        self.show(share, f"step {state.step} of {state.steps}, {left} left, {roots}")
+def _told(state: HistoryProgress) -> tuple[float, str]:
+    """Share of the history that is done, and where it is."""
+    of_step = state.stages / (state.stages + state.waiting)
+    share = (state.step - 1 + of_step) / state.steps
+    left, roots = counted(state.waiting, "start"), counted(state.roots, "root")
+    return share, f"step {state.step} of {state.steps}, {left} left, {roots}"
 
 
 def _steps(problem: str, steps: str | None) -> Any:

@@ -28,6 +28,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
 
     import pandas as pd
+    from matplotlib.figure import Figure
 
     from enumsol.model.problem3d import AnyProblem
 
@@ -129,7 +130,7 @@ def checking_commands(proven: bool, source: str | None, command: str, place: str
     return [verify] if proof is not None else [f"enumsol {command} {problem} {place} --proof {file}", verify]
 
 
-def write_figure(path: str, figure: Any) -> None:
+def write_figure(path: str, figure: Figure) -> None:
     """Write a matplotlib figure.
 
     Raises
@@ -189,7 +190,7 @@ def list_entries(
     ``content`` are the entries, dataclasses; what cannot be printed (a function) is left out.
     """
     if json_file is not None:
-        entries = [{name: getattr(entry, name) for name in _shown(entry)} for entry in content]
+        entries = [taken(entry, *(item.name for item in fields(entry) if item.repr)) for entry in content]
         write_text(json_file, as_json(entries))
         if json_file == "-":
             return
@@ -223,7 +224,3 @@ def list_entries(
     console = Console(highlight=False)
     console.print(table, markup=False)
     console.print(f"\n{hint}", style="dim", markup=False)
-
-
-def _shown(entry: Any) -> list[str]:
-    return [item.name for item in fields(entry) if item.repr]

@@ -7,8 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from enumsol.cli.common import COLLECTION, GALLERY, ExitStatus
-from enumsol.cli.files import FileCommand
-from enumsol.cli.options import JsonFile, Quiet, csv
+from enumsol.cli.options import Argument, OutputFile, Quiet, add_command
 from enumsol.cli.output import deliver, list_entries, named_group
 from enumsol.support.messages import counted
 
@@ -19,8 +18,7 @@ gallery_app = named_group("Named problems to experiment with.")
 collection_app = named_group("Problems with certified solutions, and a check of what other solvers find.")
 
 
-@gallery_app.command("list", cls=FileCommand)
-def list_gallery(json_file: JsonFile = None) -> None:
+def list_gallery(json_file: OutputFile | None = None) -> None:
     """List the problems, each with an alpha of interest and the number of its roots there."""
     from enumsol import gallery  # numpy and scipy: not for --help
 
@@ -36,21 +34,14 @@ def _count(entry: GalleryEntry) -> str:
     return str(entry.roots)
 
 
-@gallery_app.command(cls=FileCommand)
-def write(
-    name: Annotated[str, typer.Argument(metavar="NAME", help="Name as in enumsol gallery list.", show_default=False)],
-    file: Annotated[
-        str,
-        typer.Argument(
-            metavar="FILE",
-            help="File to write: .npz, .h5 (fclib), or a directory for MatrixMarket files.",
-            show_default=False,
-        ),
-    ],
-    json_file: JsonFile = None,
-    quiet: Quiet = False,
-) -> None:
-    """Write the problem NAME to FILE, in a format that read_problem and the other commands accept."""
+def write(name: Argument, file: Argument, json_file: OutputFile | None = None, quiet: Quiet = False) -> None:
+    """Write the problem NAME to FILE, in a format that read_problem and the other commands accept.
+
+    Parameters
+    ----------
+    name : Name as in enumsol gallery list.
+    file : File to write: .npz, .h5 (fclib), or a directory for MatrixMarket files.
+    """
     from enumsol import gallery  # as above
     from enumsol.io import write_problem
 
@@ -66,8 +57,7 @@ def write(
     )
 
 
-@collection_app.command("list", cls=FileCommand)
-def list_collection(json_file: JsonFile = None) -> None:
+def list_collection(json_file: OutputFile | None = None) -> None:
     """List the problems, each with its dimension, its contact nodes and the number of its solutions."""
     from enumsol import collection  # numpy: not for --help
 
@@ -80,19 +70,19 @@ def list_collection(json_file: JsonFile = None) -> None:
     list_entries(columns, rows, json_file=json_file, content=list(collection.COLLECTION.values()), hint=hint)
 
 
-@collection_app.command(cls=FileCommand)
 def export(
-    folder: Annotated[
-        str, typer.Argument(metavar="FOLDER", help="Folder to write to; it is made if need be.", show_default=False)
-    ],
-    names: Annotated[
-        list[str] | None,
-        typer.Argument(metavar="[NAME]...", help="Only these problems; default: all.", show_default=False),
-    ] = None,
-    json_file: JsonFile = None,
+    folder: Argument,
+    names: Annotated[list[str] | None, typer.Argument(metavar="[NAME]...", show_default=False)] = None,
+    json_file: OutputFile | None = None,
     quiet: Quiet = False,
 ) -> None:
-    """Write the problems as .npz and .h5 (fclib), with their certified solutions (JSON) and proofs, to FOLDER."""
+    """Write the problems as .npz and .h5 (fclib), with their certified solutions (JSON) and proofs, to FOLDER.
+
+    Parameters
+    ----------
+    folder : Folder to write to; it is made if need be.
+    names : Only these problems; default: all.
+    """
     from enumsol import collection  # as above
 
     written = collection.export(folder, [name.removeprefix(COLLECTION) for name in names] if names else None)
@@ -106,23 +96,11 @@ def export(
     )
 
 
-@collection_app.command(cls=FileCommand)
 def check(
-    solutions: Annotated[
-        str,
-        typer.Argument(
-            metavar="SOLUTIONS",
-            help="A file NAME.npz, .json, .csv or .h5 (fclib) with what a solver found for the problem NAME, or a "
-            "folder of such files.",
-            show_default=False,
-        ),
-    ],
-    tolerance: Annotated[
-        float,
-        typer.Option(metavar="NUMBER", help="Distance up to which an answer is a solution, as explained above."),
-    ] = 1e-4,
-    json_file: JsonFile = None,
-    csv_file: Annotated[str | None, csv("answer")] = None,
+    solutions: Argument,
+    tolerance: Annotated[float, typer.Option(metavar="NUMBER")] = 1e-4,
+    json_file: OutputFile | None = None,
+    csv_file: OutputFile | None = None,
     quiet: Quiet = False,
 ) -> None:
     """Say which solutions of the collection a solver found, which it missed, and which of its answers are spurious.
@@ -139,6 +117,13 @@ def check(
     Exit status: 0 if all solutions of every problem that was tried were found, and every answer is one; 3 if a solution
     was missed or an answer is spurious; 2 on bad input; 74 if a result could not be written; 141 if the program that
     read it has ended.
+
+    Parameters
+    ----------
+    solutions : A file NAME.npz, .json, .csv or .h5 (fclib) with what a solver found for the problem NAME, or a folder
+        of such files.
+    tolerance : Distance up to which an answer is a solution, as explained above.
+    csv_file : Write a table with one row per answer; - is stdout.
     """
     from enumsol import collection  # as above
 
@@ -151,3 +136,13 @@ def check(
         frame=report.to_frame,
     )
     raise typer.Exit(ExitStatus.DONE if report.ok else ExitStatus.INCOMPLETE)
+
+
+for _app, _command, _name in (
+    (gallery_app, list_gallery, "list"),
+    (gallery_app, write, "write"),
+    (collection_app, list_collection, "list"),
+    (collection_app, export, "export"),
+    (collection_app, check, "check"),
+):
+    add_command(_app, _command, _name)

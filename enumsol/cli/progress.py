@@ -19,8 +19,6 @@ if TYPE_CHECKING:
 
 #: Work shorter than this shows no progress [seconds].
 _PROGRESS_DELAY = 1.0
-#: A smaller part of the work says nothing about the rest.
-_LEAST_SHARE = 0.02
 
 
 class Display:
@@ -34,10 +32,17 @@ class Display:
         What is going on.
     steps : mapping, optional
         Work that fills the bar when it is told, and from which to which share.
+    told : callable, optional
+        What `show` takes, of what the display is called with.
     """
 
-    def __init__(self, title: str, steps: Mapping[str, tuple[float, float]] | None = None) -> None:
-        self._title, self._steps = title, {} if steps is None else steps
+    def __init__(
+        self,
+        title: str,
+        steps: Mapping[str, tuple[float, float]] | None = None,
+        told: Callable[..., tuple[Any, ...]] = lambda *shown: shown,
+    ) -> None:
+        self._title, self._steps, self._of = title, {} if steps is None else steps, told
         self._work, self._hearing = "", heard_by(self.hear)
         self._started = self._begun = self._told = time.perf_counter()
         self._step, self._share, self._note, self._completed = "", 0.0, "", 0.0
@@ -69,6 +74,10 @@ class Display:
         self._share, self._note, self._work = share, note, ""
         self._completed = max(self._completed, first + share * (last - first))
         self._draw()
+
+    def __call__(self, *state: object) -> None:
+        """Show the state of the work."""
+        self.show(*self._of(*state))
 
     def hear(self, work: str, done: int, of: int) -> None:
         """Show what a long call is at: behind the bar, or as a step that fills it."""
@@ -116,7 +125,7 @@ def remaining(seconds: float, share: float, since: float = 0.0) -> str:
 
     Nothing before enough is done to tell, nor once that time has passed.
     """
-    if not _LEAST_SHARE <= share < 1.0:
+    if not 0.02 <= share < 1.0:  # a smaller part of the work says nothing about the rest
         return ""
     left = seconds * (1.0 - share) / share - since
     if left < 0.5:
@@ -127,16 +136,14 @@ def remaining(seconds: float, share: float, since: float = 0.0) -> str:
     return f", about {left:.0f} s left"
 
 
-class SearchDisplay(Display):
+def search_display() -> Display:
     """Progress of a search: the callback of enumerate_roots."""
 
-    def __init__(self) -> None:
-        super().__init__("searching")
-
-    def __call__(self, state: SearchProgress) -> None:
-        """Show where the search is."""
+    def told(state: SearchProgress) -> tuple[float, str]:
         resumed = f" and {state.resumed:,} from the file" if state.resumed else ""
-        self.show(state.covered, f"nodes {state.nodes:,}{resumed}  roots {state.solutions:,}")
+        return state.covered, f"nodes {state.nodes:,}{resumed}  roots {state.solutions:,}"
+
+    return Display("searching", told=told)
 
 
 def _progress_bar(title: str, counts: Callable[[], str]) -> tuple[Progress, TaskID]:

@@ -2,92 +2,62 @@
 
 from __future__ import annotations
 
+import json
+import math
 import shlex
 from dataclasses import dataclass
-from inspect import Parameter, signature
-from typing import TYPE_CHECKING, Annotated, Any, Literal, NoReturn
+from typing import TYPE_CHECKING, Any, Literal, NoReturn
 
-import typer
-
-from enumsol.cli import common, options, output, root_report
-from enumsol.cli.progress import SearchDisplay
+from enumsol.cli import common, options, output
+from enumsol.cli.output import plain, taken
+from enumsol.cli.progress import search_display
 from enumsol.errors import InvalidArgumentError
-from enumsol.support.messages import counted
+from enumsol.support.messages import counted, visible
 
 if TYPE_CHECKING:
+    from collections.abc import Iterator
+
     from enumsol.fem import Scene
     from enumsol.model.problem3d import AnyProblem
-    from enumsol.roots.root_set import RootSet
-    from enumsol.support.array_types import Alpha
-
-Method = Literal["tree", "exhaustive"]
-AtAlpha = Annotated[
-    str,
-    options.number(
-        "--alpha", "Parameter value: a decimal number, read as float64, or a fraction such as 8/3, taken exactly."
-    ),
-]
-HowExact = Annotated[
-    options.Arithmetic,
-    typer.Option(
-        help="verified: rigorous error bounds, with proof. fast: floats and a tolerance, never proven. "
-        "exact: rationals throughout, with proof, for small problems."
-    ),
-]
-HowSearched = Annotated[
-    Method, typer.Option(help="tree: a tree search. exhaustive: all 4^p selections, fast or exact, for small p.")
-]
-
-
-StopAfter = Annotated[int | None, options.count("Stop at N roots; 2 decides whether the solution is unique.")]
-Unique = Annotated[
-    bool, typer.Option("--unique", help="Only report whether there is one solution; stop at a second one.")
-]
-WithStability = Annotated[
-    bool, typer.Option("--stability", help="Say which roots run away; PROBLEM has a mesh or a mass.")
-]
-Jobs = Annotated[int, options.count("Number of processes that search (tree).")]
-ProofFile = Annotated[str | None, options.file("--proof", "Write the proof (verified).")]
-Resume = Annotated[
-    bool,
-    typer.Option(
-        "--resume", help="Resume from the proof in --proof FILE, if there is one.", rich_help_panel=options.OUTPUT
-    ),
-]
-CsvFile = Annotated[str | None, options.csv("root and contact node")]
+    from enumsol.roots.root import Root, RootFamily
+    from enumsol.roots.root_set import RootSet, Undecided
+    from enumsol.support.array_types import Alpha, Floats
 
 
 @dataclass(frozen=True)
 class Search:
     """A search at one alpha as its options describe it; every field is an option, in the order of the help.
 
-    Attributes
+    Parameters
     ----------
-    *_file : names of the files that results go to; None where there is none
-    unique : whether the only question is if there is one solution
+    arithmetic : verified: rigorous error bounds, with proof. fast: floats and a tolerance, never proven. exact:
+        rationals throughout, with proof, for small problems.
+    method : tree: a tree search. exhaustive: all 4^p selections, fast or exact, for small p.
+    unique : Only report whether there is one solution; stop at a second one.
+    stability : Say which roots run away; PROBLEM has a mesh or a mass.
+    stop_after : Stop at N roots; 2 decides whether the solution is unique.
+    jobs : Number of processes that search (tree).
+    proof_file : Write the proof (verified).
+    resume : Resume from the proof in --proof FILE, if there is one.
+    csv_file : Write a table with one row per root and contact node; - is stdout.
+    report_file : Write an HTML page about the roots, with their deformed bodies.
     """
 
-    arithmetic: HowExact = "verified"
-    method: HowSearched = "tree"
-    unique: Unique = False
-    stability: WithStability = False
-    stop_after: StopAfter = None
-    max_nodes: options.MaxNodes = None
-    time_limit: options.TimeLimit = None
-    jobs: Jobs = 1
-    proof_file: ProofFile = None
-    resume: Resume = False
-    json_file: options.JsonFile = None
-    csv_file: CsvFile = None
-    vtu_file: options.VtuFile = None
-    report_file: options.ReportFile = None
-    units: options.Units = None
-
-    @classmethod
-    def as_options(cls, *without: str) -> list[Parameter]:
-        """The fields as options of a command, but for some."""
-        fields = signature(cls, eval_str=True).parameters.values()
-        return [field.replace(kind=Parameter.KEYWORD_ONLY) for field in fields if field.name not in without]
+    arithmetic: options.Arithmetic = "verified"
+    method: Literal["tree", "exhaustive"] = "tree"
+    unique: bool = False
+    stability: bool = False
+    stop_after: options.Count | None = None
+    max_nodes: options.Count | None = None
+    time_limit: options.Seconds | None = None
+    jobs: options.Count = 1
+    proof_file: options.OutputFile | None = None
+    resume: options.OutputFlag = False
+    json_file: options.OutputFile | None = None
+    csv_file: options.OutputFile | None = None
+    vtu_file: options.OutputFile | None = None
+    report_file: options.OutputFile | None = None
+    units: options.Units | None = None
 
     def check(self) -> None:
         """Refuse options that contradict each other, and a proof to resume from that is not named.
@@ -128,12 +98,8 @@ class Search:
             (self.report_file, lambda path: self._write_page(found, path, name, source, scene)),
             json_file=self.json_file,
             csv_file=self.csv_file,
-            text=lambda: (
-                root_report.uniqueness(found)
-                if self.unique
-                else common.in_units(root_report.roots_as_text(found), units)
-            ),
-            content=lambda: root_report.roots_as_json(found, name),
+            text=lambda: uniqueness(found) if self.unique else common.in_units(roots_as_text(found), units),
+            content=lambda: roots_as_json(found, name),
             frame=found.to_frame,
         )
         partly = [name for name, path in (("the CSV", self.csv_file), ("--vtu", self.vtu_file)) if path is not None]
@@ -159,15 +125,15 @@ class Search:
         names = ("arithmetic", "method", "max_nodes", "time_limit", "resume")
         asked: dict[str, Any] = {name: getattr(self, name) for name in names}
         asked |= {"stop_after": 2 if self.unique else self.stop_after, "proof_path": self.proof_file}
-        with common.workers(self.jobs) as executor, SearchDisplay() as display:
+        with common.workers(self.jobs) as executor, search_display() as display:
             found = enumerate_roots(problem, alpha, executor=executor, progress=display, **asked)
         if self.stability:
             found.stability()
         return found
 
 
-@options.with_options(*Search.as_options(), after=2)
-def roots(problem: options.ProblemArgument, alpha: AtAlpha, *, quiet: options.Quiet = False, **chosen: Any) -> None:
+@options.with_options(*options.options_of(Search), after=2)
+def roots(problem: options.Problem, alpha: options.Number, *, quiet: options.Quiet = False, **chosen: Any) -> None:
     """Find all solutions of PROBLEM at one ALPHA.
 
     Prints a table of the roots and whether it is complete; lambda_n and lambda_t are nodal forces, not pressures. The
@@ -177,6 +143,10 @@ def roots(problem: options.ProblemArgument, alpha: AtAlpha, *, quiet: options.Qu
     with nothing undecided), with --unique if yes or no is proven; 3 if something remained undecided, a limit cut the
     search short, or the indices do not add up to +1; 2 on bad input; 130 on Ctrl-C, after printing what was found so
     far; 74 if a result could not be written; 141 if the program that read it has ended.
+
+    Parameters
+    ----------
+    alpha : Parameter value: a decimal number, read as float64, or a fraction such as 8/3, taken exactly.
     """
     search = Search(**chosen)
     search.check()
@@ -197,3 +167,129 @@ def _status(found: RootSet) -> common.ExitStatus:
     if found.stopped is not None or found.undecided or not found.adds_up:
         return common.ExitStatus.INCOMPLETE
     return common.ExitStatus.DONE
+
+
+# -- a RootSet as text for the terminal and as JSON --------------------------------------------------------------------
+
+_STATS = ("nodes", "pruned", "selections", "qps", "fallback_qps", "closed", "seconds", "resumed", "held", "held_open")
+_VALUES = ("lambda_n", "lambda_t", "u_n", "u_t")
+
+
+def roots_as_text(found: RootSet) -> str:
+    """The printed RootSet, and before its closing lines nothing else; small ones with a table over contact nodes."""
+    rows = (len(found) + sum(len(family.vertices) for family in found.families)) * len(found.node_ids)
+    if not 0 < rows <= 24:
+        return repr(found)
+    from enumsol.roots.root import node_heading  # numpy: not for --help
+
+    width = max(4, *(len(visible(label)) for label in found.node_ids))
+    tangents = 2 if len(found) and found[0].lambda_t.ndim == 2 else 1
+    # a continuum has forces only
+    places = found[0].problem.coordinates if len(found) else None
+    lines = [f"{'':>8} {node_heading(width, tangents, places)}"]
+    for k, root in enumerate(found):
+        lines += _root_rows(f"root {k}", root, found.node_ids, width, places)
+    for k, family in enumerate(found.families):
+        lines += _family_rows(k, family, found.node_ids, width)
+    return "\n".join([*lines, "", repr(found)])
+
+
+def _root_rows(title: str, root: Root, node_ids: tuple[Any, ...], width: int, places: Floats | None) -> Iterator[str]:
+    from enumsol.roots.root import node_line  # as above
+
+    for i, label in enumerate(node_ids):
+        yield f"{title if i == 0 else '':>8} {node_line(root, i, label, width, places)}"
+
+
+def _family_rows(k: int, family: RootFamily, node_ids: tuple[Any, ...], width: int) -> Iterator[str]:
+    yield f"family {k}, vertices"
+    for j, vertex in enumerate(family.vertices):
+        for i, (label, (normal, tangential)) in enumerate(zip(node_ids, vertex, strict=True)):
+            numbers = f"{normal + 0.0:>12.6g} {tangential + 0.0:>12.6g}"
+            yield f"{j if i == 0 else '':>8} {visible(label):>{width}} {'':<7} {numbers}"
+
+
+def uniqueness(found: RootSet) -> str:
+    """Line that says whether there is one solution."""
+    if found.unique is None:
+        why = "fast arithmetic proves nothing" if found.arithmetic == "fast" else found.closing_line
+        return f"unique: not known ({why})"
+    if found.unique:
+        bound = found.rigid_bound
+        within = f", {bound.words()}" if bound is not None and bound.needed else ""
+        return (
+            f"unique: yes ({'proven by one certificate' if found.by_one_certificate else 'proven by a search'}{within})"
+        )
+    what = "a continuum of solutions" if found.families else "two solutions"
+    return f"unique: no ({what}, proven; --unique looks for no more)"
+
+
+def roots_as_json(found: RootSet, problem: str) -> str:
+    """The whole result; numbers read back as the same float64, what is not finite is null."""
+    bound = found.rigid_bound
+    content = {
+        "problem": problem,
+        "alpha": float(found.alpha),
+        "alpha_text": str(found.alpha),
+        **taken(found, "arithmetic", "method", "complete"),
+        "certified_data": found.certified_data if found.complete else None,
+        "completeness": found.closing_line,
+        **taken(found, "unique", "by_one_certificate", "stopped", "notes", "index_sum"),
+        **({} if bound is None else {"max_rigid_displacement": bound.largest, "bound_needed": bound.needed}),
+        "node_ids": found.node_ids,
+        "roots": [_root(root) | _stability(found, k) for k, root in enumerate(found)],
+        "families": [_family(family) for family in found.families],
+        "undecided": [_undecided(item) for item in found.undecided],
+        "stats": taken(found.stats, *_STATS),
+    }
+    return "{\n" + ",\n".join(f"{json.dumps(key)}: {_lines(value)}" for key, value in plain(content).items()) + "\n}"
+
+
+def _lines(value: object) -> str:
+    """JSON with one line per entry of a list of objects."""
+    if isinstance(value, list) and value and isinstance(value[0], dict):
+        return "[\n" + ",\n".join(json.dumps(item) for item in value) + "\n]"
+    return json.dumps(value, default=str)
+
+
+def _root(root: Root) -> dict[str, Any]:
+    if root.lambda_t.ndim == 2:
+        more = {"slip_angle": _angles(root.slip_angle)}
+        more |= {} if root.rigid_coordinates is not None else taken(root, "dlambda_dalpha")
+    elif root.rigid_coordinates is not None:
+        more = taken(root, "rigid_coordinates", "rigid_displacement")
+    else:
+        more = taken(root, "condition", "dlambda_dalpha")
+    return {
+        **taken(root, "statuses", "active", *_VALUES),
+        "enclosure": None if root.enclosure is None else taken(root.enclosure, *_VALUES),
+        **taken(root, "index", "regular", "margin"),
+        **more,
+    }
+
+
+def _stability(found: RootSet, k: int) -> dict[str, Any]:
+    if found.verdicts is None:
+        return {}
+    return {"stability": taken(found.verdicts[k], "verdict", "growth_rates", "bounds", "reason")}
+
+
+def _undecided(item: Undecided) -> dict[str, Any]:
+    content = taken(item, "statuses", "reason", "hint")
+    if item.slip_angle is None:
+        return content
+    bounds = None if item.bounds is None else taken(item.bounds, *_VALUES)
+    return {**content, "leaves": item.leaves, "slip_angle": _angles(item.slip_angle), "bounds": bounds}
+
+
+def _angles(angles: Floats | None) -> list[list[float] | None]:
+    return [] if angles is None else [None if math.isnan(low) else [low, high] for low, high in angles.tolist()]
+
+
+def _family(family: RootFamily) -> dict[str, Any]:
+    parts = [
+        taken(part, "statuses", "dimension", "vertices")
+        | ({} if part.rigid_coordinates is None else taken(part, "rigid_coordinates"))
+        for part in family.polytopes
+    ]
+    return {**taken(family, "index", "dimension", "vertices_proven"), "polytopes": parts}

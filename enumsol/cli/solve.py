@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any, NamedTuple
 import typer
 
 from enumsol.cli.common import GALLERY, TOML, note, parse_alpha, refuse_misspelt, units_of
-from enumsol.cli.options import LIMITS, OUTPUT, Quiet, file, with_options
+from enumsol.cli.options import LIMITS, OUTPUT, Argument, OutputFile, OutputFlag, Quiet, options_of, with_options
 from enumsol.cli.output import deliver, write_figure
 from enumsol.cli.progress import Display
 from enumsol.cli.roots import Search
@@ -28,20 +28,19 @@ class Given(NamedTuple):
 
     Attributes
     ----------
-    panel, metavar, help : in the help; a metavar that begins with NAME= or [NAME=] is of values by parts of the body
+    panel, metavar : in the help; a metavar that begins with NAME= or [NAME=] is of values by parts of the body
     read : function of the text of a value and the option's name
     repeated : whether it may be given several times
     """
 
     panel: str
     metavar: str
-    help: str
     read: Callable[[str, str], Any]
     repeated: bool = True
 
-    def value(self, given: Any, option: str) -> Any:
+    def value(self, given: str | list[str], option: str) -> Any:
         """The option's value, of its text or, if it may be repeated, of its texts."""
-        if not self.repeated:
+        if isinstance(given, str):
             return self.read(given, option)
         if self.metavar.startswith("NAME=") or (self.metavar.startswith("[NAME=]") and "=" in "".join(given)):
             return _by_part(given, option, self.read)
@@ -113,49 +112,34 @@ def _obstacle(text: str, option: str) -> dict[str, Any]:
     return _by_part([text], option, _numbers)
 
 
-_FORCE = "Force per area (in 2D per length and unit thickness)."
-_TIMES_ALPHA = "The same, times alpha."
 _PULL = "NAME=fx,fy[,fz]"
-_PAIR = "Parts of two bodies that may touch, first the one whose nodes are the contact nodes; may be repeated."
-_PLANES = "In 2D, plane strain or plane stress; default: strain, but for files of elements of plane stress."
-_THICKNESS = "In 2D, thickness; by default all forces are per unit thickness."
-_FRICTION = "Coefficient of friction, by contact parts (in 3D also F1,F2); without it and --friction-slope it is alpha."
-_GAP = "Initial gap, by contact parts; negative is a press fit."
-_OBSTACLE = (
-    "plane=x,y,nx,ny (normal towards the body), circle=x,y,r, hole=x,y,r; in 3D plane=x,y,z,nx,ny,nz, "
-    "sphere=x,y,z,r, hole=x,y,z,r. Default: the contact part itself, moved by the gap."
-)
-_GROUPS = "Name of the cell data that groups the facets, for a file without names of parts."
-_PRESCRIBED = "Prescribed displacements; `free` for a component that is not prescribed."
-_SPRING = "Springs per area, along the normal and along the tangents."
-_RIGID = "Let bodies that only contact holds move as a whole, by at most this length; auto: 10 times the mesh's size."
-_WEIGHT = "Force per volume, such as the weight, by parts of the body."
 #: By their names in `fem.mesh_problem`.
 MESH_OPTIONS = {
-    "contact": Given(_BODY, "NAME", "Part of the boundary in contact; may be repeated.", _as_given),
-    "pairs": Given(_BODY, "NAME:NAME[:GAP]", _PAIR, _pair),
-    "young": Given(_BODY, "[NAME=]E", "Young's modulus [force / length^2], by parts of the body.", _number),
-    "poisson": Given(_BODY, "[NAME=]NU", "Poisson's ratio, by parts of the body.", _number),
-    "plane": Given(_BODY, "[NAME=]strain|stress", _PLANES, _plane),
-    "thickness": Given(_BODY, "[NAME=]LENGTH", _THICKNESS, _number),
-    "friction": Given(_BODY, "[NAME=]F", _FRICTION, _one_or_two),
-    "friction_slope": Given(_BODY, "[NAME=]F", _TIMES_ALPHA, _one_or_two),
-    "friction2": Given(_BODY, "[NAME=]F", "In 3D, coefficient of friction along the second axis.", _one_or_two),
-    "friction2_slope": Given(_BODY, "[NAME=]F", _TIMES_ALPHA, _number),
-    "axis": Given(_BODY, "x,y,z", "In 3D, direction of the first axis of friction.", _numbers, False),
-    "gap": Given(_BODY, "[NAME=]LENGTH", _GAP, _number),
-    "obstacle": Given(_BODY, "KIND=NUMBERS", _OBSTACLE, _obstacle, False),
-    "groups": Given(_BODY, "NAME", _GROUPS, _as_given, False),
-    "clamp": Given(_SUPPORT, "NAME", "Part that is held; may be repeated.", _as_given),
-    "symmetry": Given(_SUPPORT, "NAME", "Part on a plane of symmetry, or on rollers.", _as_given),
-    "displacement": Given(_SUPPORT, "NAME=ux,uy[,uz]", _PRESCRIBED, _numbers),
-    "spring": Given(_SUPPORT, "NAME=kn,kt", _SPRING, _numbers),
-    "max_rigid_displacement": Given(_SUPPORT, "LENGTH|auto", _RIGID, _auto_or_number, False),
-    "load": Given(_LOAD, _PULL, _FORCE, _numbers),
-    "load_slope": Given(_LOAD, _PULL, _TIMES_ALPHA, _numbers),
-    "pressure": Given(_LOAD, "NAME=P", "Force per area into the body.", _number),
-    "pressure_slope": Given(_LOAD, "NAME=P", _TIMES_ALPHA, _number),
-    "body_force": Given(_LOAD, "[NAME=]fx,fy[,fz]", _WEIGHT, _numbers),
+    "contact": Given(_BODY, "NAME", _as_given),
+    "pairs": Given(_BODY, "NAME:NAME[:GAP]", _pair),
+    "young": Given(_BODY, "[NAME=]E", _number),
+    "poisson": Given(_BODY, "[NAME=]NU", _number),
+    "plane": Given(_BODY, "[NAME=]strain|stress", _plane),
+    "thickness": Given(_BODY, "[NAME=]LENGTH", _number),
+    "density": Given(_BODY, "[NAME=]DENSITY", _number),
+    "friction": Given(_BODY, "[NAME=]F", _one_or_two),
+    "friction_slope": Given(_BODY, "[NAME=]F", _one_or_two),
+    "friction2": Given(_BODY, "[NAME=]F", _one_or_two),
+    "friction2_slope": Given(_BODY, "[NAME=]F", _number),
+    "axis": Given(_BODY, "x,y,z", _numbers, False),
+    "gap": Given(_BODY, "[NAME=]LENGTH", _number),
+    "obstacle": Given(_BODY, "KIND=NUMBERS", _obstacle, False),
+    "groups": Given(_BODY, "NAME", _as_given, False),
+    "clamp": Given(_SUPPORT, "NAME", _as_given),
+    "symmetry": Given(_SUPPORT, "NAME", _as_given),
+    "displacement": Given(_SUPPORT, "NAME=ux,uy[,uz]", _numbers),
+    "spring": Given(_SUPPORT, "NAME=kn,kt", _numbers),
+    "max_rigid_displacement": Given(_SUPPORT, "LENGTH|auto", _auto_or_number, False),
+    "load": Given(_LOAD, _PULL, _numbers),
+    "load_slope": Given(_LOAD, _PULL, _numbers),
+    "pressure": Given(_LOAD, "NAME=P", _number),
+    "pressure_slope": Given(_LOAD, "NAME=P", _number),
+    "body_force": Given(_LOAD, "[NAME=]fx,fy[,fz]", _numbers),
 }
 
 
@@ -165,67 +149,26 @@ def _flags(name: str) -> tuple[str, ...]:
 
 
 def _option(name: str, given: Given) -> Parameter:
-    how = typer.Option(
-        *_flags(name), metavar=given.metavar, help=given.help, rich_help_panel=given.panel, show_default=False
-    )
+    how = typer.Option(*_flags(name), metavar=given.metavar, rich_help_panel=given.panel, show_default=False)
     annotation = Annotated[list[str] | None, how] if given.repeated else Annotated[str | None, how]
     return Parameter(name, Parameter.KEYWORD_ONLY, default=None, annotation=annotation)
 
 
-AtAlpha = Annotated[
-    str | None,
-    typer.Option(
-        "--alpha",
-        metavar="NUMBER",
-        help="Parameter value: a number, or a fraction such as 8/3; required if friction or load depend on it.",
-        rich_help_panel=LIMITS,
-        show_default=False,
-    ),
-]
-Output = Annotated[
-    str | None,
-    typer.Option(
-        "--output",
-        "-o",
-        metavar="FILE",
-        help="Write the problem for the other commands: .npz, .h5, or a new directory.",
-        rich_help_panel=OUTPUT,
-    ),
-]
-
-
-DryRun = Annotated[
-    bool,
-    typer.Option(
-        "--dry-run",
-        help="Print what was understood: bodies, parts, loads, contact nodes, rigid modes. Nothing is solved.",
-        rich_help_panel=OUTPUT,
-    ),
-]
-Picture = Annotated[
-    str | None, file("--plot", "Draw the bodies with their parts, loads and contact nodes: .png, .pdf, .svg.")
-]
-
-
+_ALPHA = Annotated[str | None, typer.Option(metavar="NUMBER", rich_help_panel=LIMITS, show_default=False)]
 _OPTIONS = (
     *(_option(name, given) for name, given in MESH_OPTIONS.items()),
-    Parameter("alpha", Parameter.KEYWORD_ONLY, default=None, annotation=AtAlpha),
-    *Search.as_options("method", "unique"),
+    Parameter("alpha", Parameter.KEYWORD_ONLY, default=None, annotation=_ALPHA),
+    *options_of(Search, "method", "unique"),
 )
 
 
 @with_options(*_OPTIONS, after=1)
 def solve(
-    mesh: Annotated[
-        str,
-        typer.Argument(
-            metavar="MESH", help="A mesh with named parts (.msh, .vtu, ...), or a .toml file.", show_default=False
-        ),
-    ],
+    mesh: Argument,
     *,
-    output: Output = None,
-    dry_run: DryRun = False,
-    plot: Picture = None,
+    output: Annotated[str | None, typer.Option("--output", "-o", metavar="FILE", rich_help_panel=OUTPUT)] = None,
+    dry_run: OutputFlag = False,
+    plot: OutputFile | None = None,
     quiet: Quiet = False,
     **options: Any,
 ) -> None:
@@ -236,6 +179,42 @@ def solve(
     depends on alpha is written but not solved. With --dry-run, what was understood is printed.
 
     Exit status: as enumsol roots.
+
+    Parameters
+    ----------
+    mesh : A mesh with named parts (.msh, .vtu, ...), or a .toml file.
+    contact : Part of the boundary in contact; may be repeated.
+    pairs : Parts of two bodies that may touch, first the one whose nodes are the contact nodes; may be repeated.
+    young : Young's modulus [force / length^2], by parts of the body.
+    poisson : Poisson's ratio, by parts of the body.
+    plane : In 2D, plane strain or plane stress; default: strain, but for files of elements of plane stress.
+    thickness : In 2D, thickness; by default all forces are per unit thickness.
+    density : Mass per volume, by parts of the body, for --stability; a uniform one need not be given.
+    friction : Coefficient of friction, by contact parts (in 3D also F1,F2); without it and --friction-slope it is
+        alpha.
+    friction_slope : The same, times alpha.
+    friction2 : In 3D, coefficient of friction along the second axis.
+    friction2_slope : The same, times alpha.
+    axis : In 3D, direction of the first axis of friction.
+    gap : Initial gap, by contact parts; negative is a press fit.
+    obstacle : plane=x,y,nx,ny (normal towards the body), circle=x,y,r, hole=x,y,r; in 3D plane=x,y,z,nx,ny,nz,
+        sphere=x,y,z,r, hole=x,y,z,r. Default: the contact part itself, moved by the gap.
+    groups : Name of the cell data that groups the facets, for a file without names of parts.
+    clamp : Part that is held; may be repeated.
+    symmetry : Part on a plane of symmetry, or on rollers.
+    displacement : Prescribed displacements; `free` for a component that is not prescribed.
+    spring : Springs per area, along the normal and along the tangents.
+    max_rigid_displacement : Let bodies that only contact holds move as a whole, by at most this length; auto: 10 times
+        the mesh's size.
+    load : Force per area (in 2D per length and unit thickness).
+    load_slope : The same, times alpha.
+    pressure : Force per area into the body.
+    pressure_slope : The same, times alpha.
+    body_force : Force per volume, such as the weight, by parts of the body.
+    alpha : Parameter value: a number, or a fraction such as 8/3; required if friction or load depend on it.
+    output : Write the problem for the other commands: .npz, .h5, or a new directory.
+    dry_run : Print what was understood: bodies, parts, loads, contact nodes, rigid modes. Nothing is solved.
+    plot : Draw the bodies with their parts, loads and contact nodes: .png, .pdf, .svg.
     """
     texts = {name: options.pop(name) for name in MESH_OPTIONS}
     given = {name: MESH_OPTIONS[name].value(text, _flags(name)[0]) for name, text in texts.items() if text is not None}
@@ -275,7 +254,7 @@ def _scene(mesh: str, options: dict[str, Any]) -> Scene:
     """Scene that the mesh and the options, or a TOML file, describe."""
     from enumsol import fem  # numpy: not for --help
     from enumsol.fem.conditions import refuse_old_friction
-    from enumsol.fem.scenes import check_keys
+    from enumsol.fem.mesh_problems import check_keys
     from enumsol.io import SUFFIXES
     from enumsol.support.arguments import file_path
     from enumsol.support.files import unreadable

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from enumsol.cli.common import ExitStatus, finish, load_problem, parse_alpha, parse_interval, so_far, workers
-from enumsol.cli.options import Arithmetic, JsonFile, ProblemArgument, Quiet, count, csv, number, seconds
+from enumsol.cli.options import Arithmetic, Count, Number, OutputFile, Problem, Quiet, Seconds
 from enumsol.cli.output import deliver
 from enumsol.cli.progress import Display
 from enumsol.errors import EnumsolError, InvalidArgumentError
@@ -30,28 +30,22 @@ _NAMES = {
 #: Columns that count solutions; a row whose search was cut short shows what it found as a lower bound.
 _COUNTS = ("roots", "families", "open", "stick", "slip+", "slip-", "slip")
 _CAPTION = "{}: how many of the roots have a node in that status"
-#: Longer tables are printed as runs of equal counts.
-_ROWS = 40
 _FIRST, _LAST = "first alpha", "last alpha"
 _RUNS_CAPTION = "each row stands for all alphas tried from the first to the last, which have equal counts"
 
 
 def table(
-    problem: ProblemArgument,
-    first: Annotated[str | None, number("--from", "First alpha.")] = None,
-    last: Annotated[str | None, number("--to", "Last alpha.")] = None,
-    samples: Annotated[int, count("Number of evenly spaced alphas, including both ends.", least=2, panel=None)] = 21,
-    alphas: Annotated[
-        str | None, typer.Option(metavar="LIST", help="A list of alphas instead, such as 1,2.5,8/3.")
-    ] = None,
-    arithmetic: Annotated[
-        Arithmetic, typer.Option(help="Arithmetic of each enumeration, as in enumsol roots.")
-    ] = "verified",
-    max_nodes: Annotated[int | None, count("Largest number of nodes of the tree at one alpha.")] = None,
-    time_limit: Annotated[float | None, seconds("Longest time of the search at one alpha.")] = None,
-    jobs: Annotated[int, count("Number of processes, each of which searches one alpha at a time.")] = 1,
-    json_file: JsonFile = None,
-    csv_file: Annotated[str | None, csv("alpha")] = None,
+    problem: Problem,
+    first: Number | None = None,
+    last: Number | None = None,
+    samples: Annotated[int, typer.Option(min=2, metavar="N")] = 21,
+    alphas: Annotated[str | None, typer.Option(metavar="LIST")] = None,
+    arithmetic: Arithmetic = "verified",
+    max_nodes: Count | None = None,
+    time_limit: Seconds | None = None,
+    jobs: Count = 1,
+    json_file: OutputFile | None = None,
+    csv_file: OutputFile | None = None,
     quiet: Quiet = False,
 ) -> None:
     """Count the solutions of PROBLEM at many alphas, by kind of contact.
@@ -62,6 +56,18 @@ def table(
     ran to its end with nothing undecided); 3 if something remained undecided or the indices do not add up to +1
     somewhere; 2 on bad input; 130 on Ctrl-C, after printing what was done so far; 74 if a result could not be written;
     141 if the program that read it has ended.
+
+    Parameters
+    ----------
+    first : First alpha.
+    last : Last alpha.
+    samples : Number of evenly spaced alphas, including both ends.
+    alphas : A list of alphas instead, such as 1,2.5,8/3.
+    arithmetic : Arithmetic of each enumeration, as in enumsol roots.
+    max_nodes : Largest number of nodes of the tree at one alpha.
+    time_limit : Longest time of the search at one alpha.
+    jobs : Number of processes, each of which searches one alpha at a time.
+    csv_file : Write a table with one row per alpha; - is stdout.
     """
     values, body = _alphas(first, last, samples, alphas), load_problem(problem)
     limits = {"max_nodes": max_nodes, "time_limit": time_limit}
@@ -133,7 +139,7 @@ def _as_text(frame: pd.DataFrame, asked: int, ended: EnumsolError | None) -> str
             shown[name] = shown[name].astype(str).where(~_gaps(frame), ">=" + shown[name].astype(str))
     shown["complete"] = ["yes" if value else "no" for value in shown["complete"]]
     captions = [_CAPTION.format(", ".join(name for name in _COUNTS[2:] if name in shown))]
-    if len(shown) > _ROWS:
+    if len(shown) > 40:  # printed as runs of equal counts
         shown = _runs(shown)
         captions.append(_RUNS_CAPTION)
     for name in ("alpha", _FIRST, _LAST):

@@ -1,27 +1,40 @@
-"""check: a solver's answers against the certified solutions."""
+"""check: a solver's answers against the certified solutions, and the files that hold them.
+
+A file has contact forces or displacements of the problem that its name begins with, up to the first dot.
+docs/collection.md describes the formats.
+"""
 
 from __future__ import annotations
 
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
 from itertools import combinations
-from typing import TYPE_CHECKING
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from enumsol.collection.entries import COLLECTION, CertifiedSolutions, CollectionEntry
+from enumsol.collection.entries import COLLECTION, INDEX, CertifiedSolutions, CollectionEntry, get
 from enumsol.collection.reports import CollectionReport, JudgedSolution, ProblemReport
-from enumsol.collection.submissions import Submission, read_submissions
-from enumsol.errors import InvalidArgumentError
+from enumsol.errors import InvalidArgumentError, MissingDependencyError
 from enumsol.fixed_points.tresca import TrescaState
+from enumsol.io.fclib import child, numbers
 from enumsol.support.arguments import file_path, positive_number
+from enumsol.support.array_arguments import real_array
+from enumsol.support.array_types import Floats
+from enumsol.support.files import reading, unreadable
+from enumsol.support.messages import shortened
+from enumsol.support.saved import archive_arrays, json_from, table_text
 
 if TYPE_CHECKING:
     import os
 
     from enumsol.model.problem import ContactProblem
     from enumsol.model.problem3d import ContactProblem3D
-    from enumsol.support.array_types import Floats
 
     Problem = ContactProblem | ContactProblem3D
+    import pandas as pd
+
 
 #: Of answers, in parts of the size of forces or displacements: above what solvers leave, and a tenth of the least
 #: distance that two solutions of the collection may have.
@@ -195,3 +208,190 @@ def _residuals(problem: Problem, forces: Floats) -> dict[str, float]:
         u_t=tangential[1],
     )
     return dict(state.residuals)
+
+
+#: Arrays that give solutions, the first ones that are there count: forces, those in the order of fclib, displacements.
+_GIVEN = (("lambda_n", "lambda_t"), ("r",), ("u",))
+_EXPECTED = "lambda_n and lambda_t, or r, or u"
+#: Beginnings of the names of arrays by which a file of a problem is told from one of solutions.
+_PROBLEM = ("A", "A_data", "fclib_global", "fclib_local")
+
+
+@dataclass(frozen=True)
+class Submission:
+    """Solutions of one problem that a solver claims to have found.
+
+    Attributes
+    ----------
+    entry : CollectionEntry
+    file : str
+        Name of the file.
+    displacements : bool
+        ``values`` are displacements u (k, n), else contact forces (k, p d), node by node and the normal one first.
+    values : array
+    """
+
+    entry: CollectionEntry
+    file: str
+    displacements: bool
+    values: Floats
+
+
+def read_submissions(place: Path) -> list[Submission]:
+    """Solutions in a file, or in a folder of files; files that hold problems or are of other kinds are passed over.
+
+    Raises
+    ------
+    InvalidArgumentError
+        There is no such place or no solution in it, a file belongs to no problem of the collection, or it does not hold
+        what its problem needs.
+    MissingDependencyError
+        There is an fclib file, and h5py is not installed.
+    """
+    if place.is_dir():
+        files = [file for file in sorted(place.iterdir()) if file.suffix in _READERS and file.is_file()]
+        files = [file for file in files if file.name != INDEX]
+    else:
+        reason = unreadable(place)
+        if reason is not None:
+            raise InvalidArgumentError(f"solutions {place}: {reason}; expected a file or folder of solutions")
+        if place.suffix not in _READERS:
+            raise InvalidArgumentError(
+                f"solutions {place}: its name ends in {place.suffix!r}; expected a folder, or one of {_ENDINGS}"
+            )
+        files = [place]
+    found = [submission for file in files if (submission := _read(file)) is not None]
+    if not found:
+        raise InvalidArgumentError(
+            f"solutions {place}: there are none in it; expected files NAME{_ENDINGS.replace(', ', ', NAME')}, where "
+            "NAME is one of enumsol collection list"
+        )
+    return found
+
+
+def _read(file: Path) -> Submission | None:
+    """The solutions in a file, or None if it holds a problem."""
+    name = file.name.partition(".")[0]
+    try:
+        with reading(file, "solutions", "solutions as in docs/collection.md"):
+            given = _READERS[file.suffix](file)
+        if any(name in given for name in _PROBLEM):
+            return None
+        return _submission(get(name), file.name, given)
+    except InvalidArgumentError as error:
+        if str(error).startswith(str(file)):
+            raise
+        raise InvalidArgumentError(f"{file}: {error}") from error
+
+
+def _submission(entry: CollectionEntry, file: str, content: Mapping[str, Any]) -> Submission:
+    """Forces or displacements among the arrays of a file, in one row for every solution."""
+    names = next((names for names in _GIVEN if all(name in content for name in names)), None)
+    if names is None:
+        raise InvalidArgumentError(f"it holds {', '.join(content) or 'nothing'}; expected {_EXPECTED}")
+    given = {name: content[name] for name in names}
+    p, d = entry.p, entry.dimension
+    about = f"as {entry.name} has p = {p} contact nodes and n = {entry.n} degrees of freedom"
+    shapes = {"lambda_n": (p,), "lambda_t": (p,) if d == 2 else (p, 2), "r": (d * p,), "u": (entry.n,)}
+    rows = {}
+    for name, value in given.items():
+        array, shape = real_array(value, name, error=InvalidArgumentError, finite=False), shapes[name]
+        if array.shape == shape:
+            array = array[None]
+        elif array.shape[:1] == (0,):
+            array = np.zeros((0, *shape))
+        if array.shape[1:] != shape:
+            sizes = ", ".join(map(str, shape))
+            comma = "," if len(shape) == 1 else ""
+            raise InvalidArgumentError(
+                f"{name} has shape {array.shape}; expected (k, {sizes}) for k solutions, or ({sizes}{comma}) for one, "
+                f"{about}"
+            )
+        rows[name] = array
+    if "lambda_n" not in rows:
+        ((name, values),) = rows.items()
+        return Submission(entry, file, name == "u", values)
+    normal, tangential = rows["lambda_n"], rows["lambda_t"]
+    if len(normal) != len(tangential):
+        raise InvalidArgumentError(
+            f"lambda_n holds {len(normal)} solutions and lambda_t {len(tangential)}; expected the same number"
+        )
+    forces = np.concatenate([normal[:, :, None], tangential.reshape(len(normal), p, d - 1)], axis=2)
+    return Submission(entry, file, False, forces.reshape(len(normal), p * d))
+
+
+# -- formats -----------------------------------------------------------------------------------------------------------
+
+
+def _npz(file: Path) -> dict[str, Any]:
+    with file.open("rb") as stream:
+        return archive_arrays(stream)
+
+
+def _json(file: Path) -> dict[str, Any]:
+    """An object with arrays, a list of objects, or what ``enumsol roots --json`` writes."""
+    content = json_from(file.read_bytes())
+    if isinstance(content, dict) and isinstance(content.get("roots"), list):
+        content = [*content["roots"], *_vertices(content.get("families", []))]
+    if isinstance(content, dict):
+        return content
+    if not isinstance(content, list) or not all(isinstance(item, dict) for item in content):
+        raise InvalidArgumentError(f"{file}: it holds no object and no list of objects; expected {_EXPECTED}")
+    names = [name for name in sum(_GIVEN, ()) if not content or all(name in item for item in content)]
+    return {name: [item[name] for item in content] for name in names}
+
+
+def _vertices(families: list[Any]) -> Iterator[dict[str, Any]]:
+    """The vertices of continua in what ``enumsol roots --json`` writes."""
+    for family in families:
+        for part in family["polytopes"]:
+            for vertex in part["vertices"]:
+                yield dict(zip(_GIVEN[0], zip(*vertex, strict=True), strict=True))
+
+
+def _csv(file: Path) -> dict[str, Any]:
+    """Rows with a solution, a node and its forces; ``enumsol roots --csv`` writes such a file."""
+    import pandas as pd  # for tables only
+
+    frame = pd.read_csv(table_text(file)).rename(columns={"root": "solution"})
+    normal, tangential = "lambda_n", [name for name in frame.columns if name.startswith("lambda_t")]
+    missing = [name for name in ("node", normal) if name not in frame] + ([] if tangential else ["lambda_t"])
+    if missing:
+        found = shortened(", ".join(map(str, frame.columns)))
+        raise InvalidArgumentError(
+            f"{file}: the column {missing[0]} is missing (found {found}); expected solution, node, lambda_n and "
+            "lambda_t, in 3D lambda_t1 and lambda_t2"
+        )
+    if "solution" not in frame:
+        frame["solution"] = 0
+    forces = [
+        part.sort_values("node")[[normal, *tangential]].to_numpy(dtype=float)
+        for _, part in frame.groupby("solution", sort=False)
+        if _has_all_nodes(part["node"], file)
+    ]
+    return {
+        normal: [part[:, 0] for part in forces],
+        "lambda_t": [part[:, 1] if len(tangential) == 1 else part[:, 1:] for part in forces],
+    }
+
+
+def _has_all_nodes(nodes: pd.Series, file: Path) -> bool:
+    if sorted(nodes) != list(range(len(nodes))):
+        raise InvalidArgumentError(
+            f"{file}: a solution has the nodes {sorted(nodes)}; expected the rows of Bn from 0, each of them once"
+        )
+    return True
+
+
+def _h5(file: Path) -> dict[str, Any]:
+    """The group ``solution`` that fclib_write_solution adds to a problem."""
+    h5py = MissingDependencyError.imported("h5py", "fclib files", "fclib")
+    with h5py.File(file, "r") as content:
+        if "solution" not in content:
+            return dict.fromkeys(content)
+        group = child(content, "solution")
+        return {"r": numbers(group, "r")} if "r" in group else dict.fromkeys(group)
+
+
+_READERS = {".npz": _npz, ".json": _json, ".csv": _csv, ".h5": _h5, ".hdf5": _h5}
+_ENDINGS = ", ".join(_READERS)

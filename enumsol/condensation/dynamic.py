@@ -99,6 +99,8 @@ class DynamicStiffness:
     ) -> None:
         self.A, self.M, self.rows, self._modes, self.springs = A, M, rows, modes, springs
         self._known: dict[float, Ball | None] = {}
+        #: What a search keeps of it in floats.
+        self.spectrum: Any = None
 
     def at(self, mu: float) -> Ball | None:
         """K(mu), (m, m) [force / length]; None where it is not enclosed."""

@@ -76,8 +76,7 @@ class CondensedEnclosure(Sealed):
         if not problem.held:
             return enclosure_of(problem)
         with np.errstate(over="ignore", invalid="ignore", divide="ignore"):
-            enclosed = cls._from_problem(problem, products)
-        return enclosed._finite()
+            return cls._from_problem(problem, products)._finite()
 
     def restarted(self, problem: ProblemData, products: Products) -> CondensedEnclosure:
         """The enclosure of a problem of the same body with another load or slip offset: S is what it is here.

@@ -19,7 +19,7 @@ from enumsol.condensation.enclosure import EnclosedSystem, NotEnclosedError, Rig
 from enumsol.errors import InvalidProblemError
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Iterator, Sequence
 
     from enumsol.condensation.data import ProblemData
     from enumsol.condensation.enclosure import CondensedEnclosure
@@ -435,12 +435,8 @@ class AlphaSpace:
     @cached_property
     def _nodes(self) -> list[tuple[list[float], tuple[Fraction, Fraction], tuple[Fraction, Fraction]]]:
         """F of every node, and both its coefficients as affine functions of alpha."""
-        problem, F = self.enclosure.problem, self._friction[0]
-        given = np.hstack(problem.affine_friction).tolist()
-        return [
-            (by, _affine(one, one_slope), _affine(other, other_slope))
-            for by, (one, other, one_slope, other_slope) in zip(F.tolist(), given, strict=True)
-        ]
+        F = self._friction[0].tolist()
+        return [(by, one, other) for by, (one, other, _) in zip(F, node_friction(self.enclosure.problem), strict=True)]
 
     def discs(self, alpha: Fraction, change: Fraction = Fraction(1)) -> Ball:
         """Coefficients at alpha over F, (p,)."""
@@ -517,6 +513,30 @@ def _nearest(exact: Sequence[Fraction]) -> Ball:
     return Ball(mid, np.where(same, 0.0, UNIT * np.abs(mid) * SAFE + TINY))
 
 
+def node_friction(
+    problem: ProblemData,
+) -> Iterator[tuple[tuple[Fraction, Fraction], tuple[Fraction, Fraction], Fraction]]:
+    """Both coefficients of every node as affine functions of alpha, and the ratio of the second one to the first.
+
+    That is 0 where a node does not have both.
+
+    Raises
+    ------
+    NotEnclosedError
+        The ratio changes with alpha.
+    """
+    for node, numbers in zip(problem.node_ids, np.hstack(problem.affine_friction).tolist(), strict=True):
+        one, other, one_slope, other_slope = map(Fraction, numbers)
+        if one * other_slope != other * one_slope:
+            raise NotEnclosedError(
+                f"the ratio of the coefficients of friction of contact node {node} changes with alpha; expected a "
+                "constant one"
+            )
+        both = any((one, one_slope)) and any((other, other_slope))
+        ratio = (other / one if one else other_slope / one_slope) if both else Fraction(0)
+        yield (one, one_slope), (other, other_slope), ratio
+
+
 def _references(problem: ProblemData, alpha: Fraction) -> tuple[Floats, Floats]:
     """Coefficients at alpha, (p, 2), with radii: the first of a node that occurs is a float, the other one follows.
 
@@ -526,31 +546,23 @@ def _references(problem: ProblemData, alpha: Fraction) -> tuple[Floats, Floats]:
         The ratio of both changes with alpha, or there is only one, which changes.
     """
     found = np.zeros((2, problem.p, 2))
-    for i, (one, other, one_slope, other_slope) in enumerate(np.hstack(problem.affine_friction).tolist()):
-        first, second = (_affine(one, one_slope), _affine(other, other_slope))
-        if first[0] * second[1] != second[0] * first[1]:
-            raise NotEnclosedError(_RATIO.format(problem.node_ids[i]))
-        if any(first) != any(second) and (one_slope or other_slope):
+    for i, (first, second, ratio) in enumerate(node_friction(problem)):
+        if any(first) != any(second) and (first[1] or second[1]):
             raise NotEnclosedError(_ONE_AXIS.format(problem.node_ids[i]))
         at = [part[0] + alpha * part[1] for part in (first, second)]
         reference, k = (Fraction(float(at[0])), 0) if at[0] else (Fraction(float(at[1])), 1)
         found[0, i, k] = float(reference)
         if k == 0 and at[1]:
-            exact = reference * at[1] / at[0]
+            exact = reference * ratio
             found[0, i, 1] = float(exact)
             found[1, i, 1] = 0.0 if Fraction(float(exact)) == exact else 2 * UNIT * float(exact)
     return found[0], found[1]
 
 
 #: What is said of a node that is refused.
-_RATIO = "the ratio of the coefficients of friction of contact node {} changes with alpha; expected a constant one"
 _ONE_AXIS = (
     "contact node {} has friction along one axis only, which changes with alpha; expected both, or a constant one"
 )
-
-
-def _affine(value: float, slope: float) -> tuple[Fraction, Fraction]:
-    return Fraction(value), Fraction(slope)
 
 
 def _on_tau(rows: RigidRows, own: Indices, weight: Ball) -> RigidRows:

@@ -12,12 +12,8 @@ if TYPE_CHECKING:
     from enumsol.continuation.scaled_equation import ScaledEquation
     from enumsol.support.array_types import Codes, Floats
 
-#: Smooth Newton iterations inside a selection; quadratic convergence needs about five.
-MAX_SMOOTH_ITERATIONS = 20
 #: Corrections longer than this diverge: solutions have forces of size one at most, and steps are not much longer.
 MAX_CORRECTION = 1e6
-#: Smooth corrections that no longer get shorter have reached rounding, provided that they are at most this long.
-STAGNATION = 1e-8
 
 
 @dataclass(frozen=True)
@@ -94,7 +90,8 @@ def smooth_newton(
     """
     rows = equation.selection(codes)
     last = np.inf
-    for _ in range(MAX_SMOOTH_ITERATIONS):
+    # quadratic convergence needs about five
+    for _ in range(20):
         if isinstance(row, tuple):
             gradient = equation.slack_gradients(codes, x)[row]
             defect = equation.slacks(codes, x)[row] - value
@@ -109,7 +106,8 @@ def smooth_newton(
             return None
         x = x - step
         length = equation.norm(step)
-        if length <= tolerance or 0.5 * last < length <= STAGNATION:
+        # corrections this short that no longer get shorter have reached rounding
+        if length <= tolerance or 0.5 * last < length <= 1e-8:
             return x
         last = length
     return None

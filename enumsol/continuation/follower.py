@@ -10,7 +10,7 @@ import numpy as np
 
 from enumsol.continuation.corrector import Correction, moore_penrose, smooth_newton
 from enumsol.continuation.path_data import PathData, PathStatus, PointKind
-from enumsol.continuation.recorder import SAME_POINT, Landmarks, PathRecorder
+from enumsol.continuation.recorder import SAME_POINT, Landmarks, PathRecorder, points_of
 from enumsol.continuation.scaled_equation import STATUS_TOLERANCE
 from enumsol.continuation.tangents import RATE_TOLERANCE, Tangent, curve_tangent, orientation
 from enumsol.continuation.transitions import (
@@ -26,8 +26,7 @@ from enumsol.continuation.transitions import (
 )
 from enumsol.errors import InvalidArgumentError, TooLargeError
 from enumsol.search.outcome import Stop, StopReason
-from enumsol.support.deadlines import look
-from enumsol.support.keeping import keeping
+from enumsol.support.deadlines import keeping, look
 from enumsol.support.messages import counted
 
 if TYPE_CHECKING:
@@ -35,16 +34,11 @@ if TYPE_CHECKING:
 
     from enumsol.continuation.start import Start
     from enumsol.support.array_types import Floats
-    from enumsol.support.keeping import Ending
+    from enumsol.support.deadlines import Ending
 
 _Path = TypeVar("_Path", bound=PathData)
-
-#: Conditions may be negative by this much at a point that is converged to rounding.
-ROUNDING = 1e-12
-#: Without checks a transition point may lie behind by this times h_min or eps; steps are refused beyond it.
-UNCHECKED_REACH = 100.0
-#: Selection changes in a row without moving after which the path is stuck at a point where many selections meet.
-MAX_CHANGES_IN_PLACE = 32
+#: How a path ended, and why in a sentence.
+_Stop = tuple[PathStatus, str]
 
 
 @dataclass(frozen=True)
@@ -55,12 +49,6 @@ class _Step:
     kinks: tuple[Kink, ...]
     length: float
     corrections: int
-
-
-@dataclass(frozen=True)
-class _Stop:
-    status: PathStatus
-    message: str
 
 
 #: Why a path ended, in a sentence.
@@ -109,11 +97,11 @@ class Follower(Generic[_Path]):
         self.equation, self.options, self.interval = start.equation, start.options, start.interval
         self.current, self.sign = first, sign
         self.h = self.options.h_init
-        self._in_place = 0
-        self._friction_ends = False
+        self._in_place, self._friction_ends = 0, False
         (low, high), margin, scale = self.interval, self.options.overshoot, self.equation.alpha_scale
         self._low, self._high = (low - margin) / scale, (high + margin) / scale
-        self._landmarks = Landmarks.of(self.equation, first, self.options.transition_tolerance, visited)
+        tolerance, others = self.options.transition_tolerance, list(points_of(self.equation, visited))
+        self._landmarks = Landmarks(self.equation, first, tolerance, others)
         self.record = PathRecorder(self.equation)
         self.record.add(first, PointKind.START)
 
@@ -130,7 +118,7 @@ class Follower(Generic[_Path]):
 
     def _cut_short(self, ending: Ending) -> _Path:
         """The path to its last point."""
-        return self._path(_Stop(PathStatus.INTERRUPTED, f"{Stop(StopReason.of(ending))} {self._so_far}"))
+        return self._path((PathStatus.INTERRUPTED, f"{Stop(StopReason.of(ending))} {self._so_far}"))
 
     @property
     def _so_far(self) -> str:
@@ -139,8 +127,8 @@ class Follower(Generic[_Path]):
     def _path(self, stop: _Stop) -> _Path:
         return self._kind(
             **self.record.found(),
-            status=stop.status,
-            message=stop.message,
+            status=stop[0],
+            message=stop[1],
             orientation=self.sign,
             interval=self.interval,
             options=replace(self.options, alpha_scale=self.equation.alpha_scale),
@@ -151,7 +139,7 @@ class Follower(Generic[_Path]):
     def _stop(self, status: PathStatus, alpha: float | None = None, **words: object) -> _Stop:
         """The end of the path at an alpha, by default the current one."""
         at = self.equation.alpha(self.current.x) if alpha is None else alpha
-        return _Stop(status, _SENTENCES[status].format(alpha=at, **words))
+        return status, _SENTENCES[status].format(alpha=at, **words)
 
     def _stalled(self, reason: str) -> _Stop:
         return self._stop(PathStatus.STALLED, reason=reason, least=self.options.h_min)
@@ -244,7 +232,8 @@ class Follower(Generic[_Path]):
         row = equation.metric @ tangent
         tolerance = self.options.transition_tolerance
         x = smooth_newton(equation, codes, correction.x, row, float(row @ correction.x), tolerance)
-        if x is None or np.min(equation.slacks(codes, x)) < -ROUNDING:
+        # conditions may be negative by this much at a point that is converged to rounding
+        if x is None or np.min(equation.slacks(codes, x)) < -1e-12:
             return None
         tangent = curve_tangent(equation, codes, x, self.sign)
         return None if tangent is None else TangentPoint(x, codes, tangent)
@@ -273,7 +262,8 @@ class Follower(Generic[_Path]):
             return self._stop(PathStatus.FRICTION)
         arrival = next_kink(equation, self.current, self.sign, options.transition_tolerance)
         if arrival is None and not options.check_steps:
-            reach = UNCHECKED_REACH * max(options.h_min, options.eps)
+            # how far behind a transition point may lie; steps are refused beyond it
+            reach = 100.0 * max(options.h_min, options.eps)
             arrival = passed_kink(equation, self.current, self.sign, options.transition_tolerance, reach)
         if arrival is None:
             return self._stalled("no transition point was found ahead")
@@ -284,7 +274,8 @@ class Follower(Generic[_Path]):
         equation, options = self.equation, self.options
         moved = equation.norm(arrival.x - self.current.x) > SAME_POINT
         self._in_place = 0 if moved else self._in_place + 1
-        if self._in_place > MAX_CHANGES_IN_PLACE:
+        # many selections meet at this point
+        if self._in_place > 32:
             return self._stalled("the selection changes repeatedly at one point")
         try:
             keep, others = continuations(equation, arrival, self.sign)

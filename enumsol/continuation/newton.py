@@ -29,12 +29,8 @@ if TYPE_CHECKING:
     from enumsol.model.problem3d import AnyProblem
     from enumsol.support.array_types import Alpha, AlphaLike, ArrayLike, Codes, Floats, Mask
 
-#: Norm of H, relative to the load, at which an iterate is a root: well above rounding for any conditioning seen.
-RESIDUAL_TOLERANCE = 1e-10
 #: Shortest fraction of a Newton step that the line search tries.
 MIN_FRACTION = 2.0**-12
-#: Decrease of the residual that the line search asks for (Armijo).
-SUFFICIENT_DECREASE = 1e-4
 
 
 @dataclass(frozen=True)
@@ -190,7 +186,8 @@ def _iterate(equation: ScaledEquation, x: Floats, alpha: float, max_iterations: 
         now = equation.selection_at(x)
         changes = int(np.sum(np.any(now != rows, axis=1)))
         rows = now
-        if residual <= RESIDUAL_TOLERANCE:
+        # relative to the load, and well above rounding for any conditioning seen
+        if residual <= 1e-10:
             return x
         damped = damped or rows.tobytes() in seen
         seen.add(rows.tobytes())
@@ -223,7 +220,8 @@ def _fraction(equation: ScaledEquation, x: Floats, step: Floats) -> float:
     while fraction >= MIN_FRACTION:
         trial = x.copy()
         trial[:-1] -= fraction * step
-        if equation.merit(trial) <= (1 - SUFFICIENT_DECREASE * fraction) * residual:
+        # Armijo's condition
+        if equation.merit(trial) <= (1 - 1e-4 * fraction) * residual:
             return fraction
         fraction *= 0.5
     return 0.0
@@ -245,7 +243,9 @@ def build_root(problem: ContactProblem, alpha: Alpha, equation: CondensedEquatio
     return _root_of_floats(problem, alpha, equation, x, isolated=False)
 
 
-def _root_of_floats(problem: Any, alpha: Alpha, equation: ScaledEquation, x: Floats, *, isolated: bool = True) -> Root:
+def _root_of_floats(
+    problem: AnyProblem, alpha: Alpha, equation: ScaledEquation, x: Floats, *, isolated: bool = True
+) -> Root:
     """The Root at a point x of the condensed equation; not regular where a condition holds with equality.
 
     ``isolated``: it is not known to belong to a continuum.

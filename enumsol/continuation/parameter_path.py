@@ -20,10 +20,6 @@ if TYPE_CHECKING:
     from enumsol.model.problem3d import AnyProblem, ContactProblem3D
     from enumsol.support.array_types import AlphaLike, Floats, Mask
 
-#: A user's derivative may differ from a central difference by this fraction of its size: wrong formulas differ by more.
-DERIVATIVE_TOLERANCE = 1e-4
-#: Step of that central difference relative to alpha: near the cube root of the rounding unit, its best value.
-DIFFERENCE_STEP = 1e-5
 
 PathFunction = Callable[[float], Any]
 #: A problem in 2D or 3D.
@@ -170,7 +166,8 @@ class ParameterPath:
 
     def _check_derivatives(self, smooth: SmoothPath, alpha: float) -> None:
         """Compare the derivatives with central differences at the start: a wrong one stalls the corrections later."""
-        step = DIFFERENCE_STEP * max(abs(alpha), 1.0)
+        # near the cube root of the rounding unit, the best step of a central difference
+        step = 1e-5 * max(abs(alpha), 1.0)
         for name, function, derivative, shape, evaluate in (
             ("F", smooth.F, smooth.dF, self.problem.affine_friction[0].shape, _coefficients),
             ("f", smooth.f, smooth.df, (self.problem.n,), _evaluate),
@@ -184,7 +181,8 @@ class ParameterPath:
                 continue  # the start lies on the border of the functions' domain
             scale = max(np.max(np.abs(given)), np.max(np.abs(ahead)) / max(abs(alpha), 1.0))
             error = np.max(np.abs(given - (ahead - behind) / (2 * step)))
-            if error > DERIVATIVE_TOLERANCE * scale:
+            # wrong formulas differ by more than this share of the size
+            if error > 1e-4 * scale:
                 raise InvalidArgumentError(
                     f"SmoothPath.d{name} at alpha = {alpha:g} differs by {error:.2g} from a central difference of "
                     f"{name}; expected the derivative of {name} with respect to alpha"

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import fields
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
 
@@ -23,7 +23,7 @@ from enumsol.support.saved import Array, Maybe, check_kind, is_label, is_number
 
 if TYPE_CHECKING:
     import os
-    from collections.abc import Sequence
+    from collections.abc import Callable, Sequence
 
     from enumsol.continuation.parameter_path import SmoothPath
     from enumsol.model.problem3d import AnyProblem
@@ -54,7 +54,7 @@ def save_path(followed: PathData, path: str | os.PathLike[str]) -> None:
     write_arrays(file_path(path, "path"), _FORMAT, report, {name: getattr(followed, name) for name in ARRAYS})
 
 
-def _check(report: Any, arrays: dict[str, Any]) -> None:
+def _check(report: dict[str, Any], arrays: dict[str, Any]) -> None:
     """Refuse a report and arrays of other kinds than those of a path."""
     m, p = arrays["lambda_n"].shape
     statuses = ({status.value for status in ContactStatus},) * p
@@ -130,15 +130,23 @@ def _unpack(data: dict[str, Any]) -> Transition:
 _QUANTITIES = ("lambda_n", "lambda_t", "u_n", "u_t")
 
 
+class Drawn(Protocol):
+    """A branch graph, of which paths ask only for its figure."""
+
+    @property
+    def plot(self) -> Callable[..., Any]:
+        """Makes a figure of the branches."""
+
+
 def draw_path(
     path: PathData,
-    graph: Any = None,
+    graph: Drawn | None = None,
     *,
     node: int = 0,
     quantity: str = "lambda_n",
     units: tuple[str, str] | None = None,
-    ax: Any = None,
-    file: Any = None,
+    ax: object = None,
+    file: str | os.PathLike[str] | None = None,
     **of_graph: Any,
 ) -> Any:
     """A figure of the accepted steps as dots, transition points as circles, folds as squares, the start as a star.
@@ -178,33 +186,35 @@ def draw_path(
         raise InvalidArgumentError("graph and ax are both given; draw further paths with path.plot(ax=...) alone")
     if graph is not None:
         # the graph draws a figure of its own; its first panel is this node's, and no zoom shows the path
-        ax = graph.plot(quantity, [path.node_ids[node]], **{"zoom": False, "units": units, **of_graph}).axes[0]
-    elif axes_or_none(ax) is None:
-        ax = new_figure().subplots()
+        axes = graph.plot(quantity, [path.node_ids[node]], **{"zoom": False, "units": units, **of_graph}).axes[0]
+    else:
+        axes = axes_or_none(ax) or new_figure().subplots()
     values = getattr(path, quantity)[:, node]
     name = quantity
     if values.ndim == 2:
         values, name = np.linalg.norm(values, axis=1), f"|{quantity}|"
     dots = [k for k, kind in enumerate(path.kinds) if kind in (PointKind.STEP, PointKind.END)]
-    ax.plot(path.alpha[dots], values[dots], ".", color="black", markersize=3, label="steps", zorder=3)
+    axes.plot(path.alpha[dots], values[dots], ".", color="black", markersize=3, label="steps", zorder=3)
     folds = {item.point for item in path.folds}
     for marker, label, chosen in (
         ("o", "transitions", [item.point for item in path.transitions if item.point not in folds]),
         ("s", "folds", sorted(folds)),
     ):
         if chosen:
-            ax.plot(
+            axes.plot(
                 path.alpha[chosen], values[chosen], marker, color="black", markerfacecolor="none", label=label, zorder=4
             )
-    ax.plot(path.alpha[:1], values[:1], "*", color="tab:red", markersize=10, label="start", zorder=5)
-    if not ax.get_ylabel():
-        ax.set_xlabel("alpha")
+    axes.plot(path.alpha[:1], values[:1], "*", color="tab:red", markersize=10, label="start", zorder=5)
+    if not axes.get_ylabel():
+        axes.set_xlabel("alpha")
         dimension = "force" if quantity.startswith("lambda") else "length"
-        ax.set_ylabel(in_units(f"{name} of node {path.node_ids[node]}", dimension, named_units))
-        ax.set_title(f"path for alpha in [{path.alpha.min():g}, {path.alpha.max():g}]: {path.status.value}", fontsize=9)
-    named = dict(zip(*reversed(ax.get_legend_handles_labels()), strict=True))  # of several paths once
-    ax.legend(handles=list(named.values()), labels=list(named), fontsize=7, frameon=False)
-    return kept(figure_of(ax), file)
+        axes.set_ylabel(in_units(f"{name} of node {path.node_ids[node]}", dimension, named_units))
+        axes.set_title(
+            f"path for alpha in [{path.alpha.min():g}, {path.alpha.max():g}]: {path.status.value}", fontsize=9
+        )
+    named = dict(zip(*reversed(axes.get_legend_handles_labels()), strict=True))  # of several paths once
+    axes.legend(handles=list(named.values()), labels=list(named), fontsize=7, frameon=False)
+    return kept(figure_of(axes), file)
 
 
 class Path(PathData):
@@ -319,14 +329,14 @@ class AmbiguousStart(InvalidArgumentError):  # noqa: N818 (reads as a state of t
         Pass the index of one of them as ``tangent=`` to `follow`.
     """
 
-    def __init__(self, message: str, tangents: Sequence[Any]) -> None:
+    def __init__(self, message: str, tangents: Sequence[Tangent]) -> None:
         super().__init__(message)
         self.tangents = tuple(tangents)
 
 
 def follow(
     problem: AnyProblem,
-    start: Any,
+    start: object,
     direction: int = +1,
     interval: tuple[AlphaLike, AlphaLike] | None = None,
     options: ContinuationOptions | None = None,
@@ -402,7 +412,7 @@ def follow(
 
 def start_tangents(
     problem: AnyProblem,
-    start: Any,
+    start: object,
     interval: tuple[AlphaLike, AlphaLike] | None = None,
     options: ContinuationOptions | None = None,
     smooth_path: SmoothPath | None = None,

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from dataclasses import astuple, dataclass, field, replace
 from functools import cached_property
 from operator import add
-from typing import TYPE_CHECKING, Any, Self
+from typing import TYPE_CHECKING, Any, Self, overload
 
 import numpy as np
 
@@ -25,8 +25,6 @@ if TYPE_CHECKING:
     from enumsol.roots.local_branch import LocalBranchTest
     from enumsol.support.array_types import Floats, Integers, NDArray
 
-#: |d alpha / ds| below this is a vertical piece of the path: at a regular point it is well above rounding.
-VERTICAL_TOLERANCE = 1e-9
 _PRINTED_TRANSITIONS = 12
 #: The arrays of a path, one row per point.
 ARRAYS = ("alpha", "lambda_n", "lambda_t", "u_n", "u_t", "codes", "steps", "corrections", "arclength")
@@ -190,7 +188,11 @@ class PathData(Sequence[PathPoint], Sealed):
     def __len__(self) -> int:
         return len(self.alpha)
 
-    def __getitem__(self, item: Any) -> Any:
+    @overload
+    def __getitem__(self, item: int) -> PathPoint: ...
+    @overload
+    def __getitem__(self, item: slice) -> tuple[PathPoint, ...]: ...
+    def __getitem__(self, item: int | slice) -> PathPoint | tuple[PathPoint, ...]:
         if isinstance(item, slice):
             return tuple(self[k] for k in range(*item.indices(len(self))))
         try:
@@ -228,7 +230,8 @@ class PathData(Sequence[PathPoint], Sealed):
                 direction = -direction
                 continue
             for value in (transition.dalpha_before, transition.dalpha_after):
-                sign = 0 if abs(value) <= VERTICAL_TOLERANCE * self._alpha_scale else int(np.sign(value))
+                # a vertical piece: at a regular point it is well above this rounding
+                sign = 0 if abs(value) <= 1e-9 * self._alpha_scale else int(np.sign(value))
                 if sign and direction and sign != direction:
                     found.append(transition)
                 direction = sign or direction

@@ -25,10 +25,6 @@ if TYPE_CHECKING:
     from enumsol.support.array_types import Codes, Floats
 
 
-#: Slip along a tangent, for the name of a frictionless node that starts to slip: any small step serves.
-_AHEAD = 1e-6
-
-
 @dataclass(frozen=True)
 class _Recorded:
     """A point of a path, and all that is recorded of it: an interruption comes before or after it."""
@@ -60,8 +56,9 @@ class PathRecorder:
         transition = Transition(
             point=len(self.points),
             alpha=equation.alpha(after.x),
-            before=equation.statuses(before.codes, self._slip(before, -_AHEAD)),
-            after=equation.statuses(after.codes, self._slip(after, _AHEAD)),
+            # a small step along the tangent names a frictionless node that starts to slip
+            before=equation.statuses(before.codes, self._slip(before, -1e-6)),
+            after=equation.statuses(after.codes, self._slip(after, 1e-6)),
             nodes=tuple(i for i, (a, b) in enumerate(zip(before.codes, after.codes, strict=True)) if a != b),
             dalpha_before=float(before.tangent[-1] * scale),
             dalpha_after=float(after.tangent[-1] * scale),
@@ -137,13 +134,6 @@ class Landmarks:
     tolerance: float
     points: list[tuple[Floats, Codes, bool]]
 
-    @classmethod
-    def of(
-        cls, equation: ScaledEquation, origin: TangentPoint, tolerance: float, visited: Sequence[PathData]
-    ) -> Landmarks:
-        """Landmarks of a path that begins at ``origin`` where others have been followed."""
-        return cls(equation, origin, tolerance, list(_of_others(equation, visited)))
-
     def add(self, point: TangentPoint) -> None:
         """Add a transition point of the path itself."""
         self.points.append((point.x, point.codes, False))
@@ -198,7 +188,7 @@ class Landmarks:
         return x is not None and equation.norm(x - point.x) <= SAME_POINT
 
 
-def _of_others(equation: ScaledEquation, visited: Sequence[PathData]) -> Iterator[tuple[Floats, Codes, bool]]:
+def points_of(equation: ScaledEquation, visited: Sequence[PathData]) -> Iterator[tuple[Floats, Codes, bool]]:
     """Starts, transition points and ends of other paths, with the statuses on both sides."""
     for path in visited:
         for k, kind in enumerate(path.kinds):

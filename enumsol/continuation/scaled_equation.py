@@ -42,10 +42,6 @@ if TYPE_CHECKING:
 #: A condition within this of zero counts as met with equality; forces and displacements are of size one after scaling,
 #: points are converged to about 1e-12.
 STATUS_TOLERANCE = 1e-9
-#: Interval points at which the size of a load that varies is measured.
-_LOAD_SAMPLES = 9
-#: Parts of a unit tangent that are rounding, where the body moves as a whole.
-_RIGID_TOLERANCE = 1e-9
 
 
 class ScaledEquation(ABC):
@@ -105,7 +101,7 @@ class ScaledEquation(ABC):
         low, high = interval
         samples = [start]
         if math.isfinite(low) and math.isfinite(high):
-            samples += list(np.linspace(low, high, _LOAD_SAMPLES))
+            samples += list(np.linspace(low, high, 9))
         loads = np.array([self._per_unit(self.path.at(alpha).g, sigma, 1.0) for alpha in samples])
         loads = loads[np.all(np.isfinite(loads), axis=1)]
         size = float(np.max(np.abs(loads), initial=0.0))
@@ -184,7 +180,8 @@ class ScaledEquation(ABC):
     def moves_rigidly(self, tangent: Floats) -> bool:
         """True if a curve with this unit tangent changes the rigid displacement alone."""
         others = np.delete(tangent, slice(self.m, self.m + self.modes))
-        return self.modes > 0 and bool(np.max(np.abs(others)) <= _RIGID_TOLERANCE)
+        # parts of a unit tangent that are rounding
+        return self.modes > 0 and bool(np.max(np.abs(others)) <= 1e-9)
 
     def at(self, x: Floats) -> PathValues:
         """Scaled values of the paths; derivatives are with respect to the scaled alpha."""

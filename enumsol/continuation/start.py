@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -37,7 +37,7 @@ def check_problem(problem: object, smooth_path: SmoothPath | None) -> None:
 
 
 def equation_on(
-    problem: Any,
+    problem: AnyProblem,
     smooth_path: SmoothPath | None,
     start: float,
     interval: tuple[float, float] = (-math.inf, math.inf),
@@ -66,7 +66,7 @@ class Start:
     def __init__(
         self,
         problem: AnyProblem,
-        start: Any,
+        start: object,
         interval: tuple[AlphaLike, AlphaLike] | None,
         options: ContinuationOptions | None,
         smooth_path: SmoothPath | None,
@@ -118,7 +118,7 @@ class Start:
         return x
 
 
-def _start_values(start: Any, tangential: tuple[int, ...], modes: int) -> tuple[float, Floats, Floats]:
+def _start_values(start: object, tangential: tuple[int, ...], modes: int) -> tuple[float, Floats, Floats]:
     """alpha, the forces (m,) and rigid coordinates (modes,) of a start whose lambda_t has that shape."""
     values = (*_NAMES, *((_RIGID,) if modes else ()))
     if isinstance(start, tuple) and len(start) == len(values):

@@ -22,8 +22,6 @@ if TYPE_CHECKING:
 
 #: A singular value of a selection's balanced gradient below this fraction of the largest counts as zero.
 RANK_TOLERANCE = 1e-10
-#: Sweeps that balance rows and columns of a gradient: each takes the root of what is left of their sizes.
-_BALANCING = 6
 #: The rate of a vanishing condition along an admissible tangent may be negative by rounding, as much as this.
 RATE_TOLERANCE = 1e-8
 #: Two tangents closer than this are one.
@@ -151,7 +149,8 @@ def _balanced(J: Floats) -> tuple[Floats, Floats]:
     zeros (alpha where nothing depends on it) is a zero column.
     """
     scaled, columns = J.copy(), np.ones(J.shape[1])
-    for _ in range(_BALANCING):
+    # each sweep takes the root of what is left of the sizes
+    for _ in range(6):
         for axis in (1, 0):
             size = np.max(np.abs(scaled), axis=axis, keepdims=True)
             factor = np.exp2(-np.round(0.5 * np.log2(np.where(size > 0, size, 1.0))))

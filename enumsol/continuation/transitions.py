@@ -31,11 +31,6 @@ ACTIVE_TOLERANCE = 1e-8
 #: Lengths along the path that should be positive may be negative by this much: a condition accepted at -ROUNDING lies
 #: behind its zero by that over its rate, which may be small.
 FORWARD_TOLERANCE = 1e-7
-#: How far the middle of a piece may lie from the cubic through its ends, relative to its length, where a selection may
-#: have several curves: an end on another curve shows as a detour.
-DETOUR_TOLERANCE = 1e-2
-#: Cosine of the largest turn of the tangent along an accepted piece of one selection's curve (60 degrees).
-LEAST_COSINE = 0.5
 
 
 @dataclass(frozen=True)
@@ -76,7 +71,8 @@ def same_curve(equation: ScaledEquation, start: TangentPoint, end: TangentPoint,
         return False
     if length <= FORWARD_TOLERANCE:
         return True
-    if equation.dot(start.tangent, end.tangent) < (0.0 if sharp else LEAST_COSINE):
+    # 60 degrees
+    if equation.dot(start.tangent, end.tangent) < (0.0 if sharp else 0.5):
         return False
     s0, s1 = equation.slacks(start.codes, start.x), equation.slacks(start.codes, end.x)
     finite = np.isfinite(s0)
@@ -94,7 +90,8 @@ def _joined(equation: ScaledEquation, start: TangentPoint, end: TangentPoint, le
     middle = start.x + 0.5 * chord + length / 8 * (start.tangent - end.tangent)
     row = equation.metric @ chord / length
     x = smooth_newton(equation, start.codes, middle, row, float(row @ middle), FORWARD_TOLERANCE)
-    return x is not None and equation.norm(x - middle) <= DETOUR_TOLERANCE * length + FORWARD_TOLERANCE
+    # an end on another curve of the selection shows as a detour
+    return x is not None and equation.norm(x - middle) <= 1e-2 * length + FORWARD_TOLERANCE
 
 
 def turning_point(

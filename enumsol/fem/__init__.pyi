@@ -10,6 +10,12 @@ from .assembly import (
 )
 from .bases import MeshNorms as MeshNorms, cell_stresses as cell_stresses, h1_norms as h1_norms
 from .mesh_files import read_mesh as read_mesh, read_solid as read_solid
+from .mesh_problems import (
+    mesh_problem as mesh_problem,
+    mesh_scene as mesh_scene,
+    read_mesh_problem as read_mesh_problem,
+    read_mesh_scene as read_mesh_scene,
+)
 from .meshes import (
     Mesh as Mesh,
     PartedMesh as PartedMesh,
@@ -21,13 +27,7 @@ from .meshes import (
     rectangle as rectangle,
     trapezoid as trapezoid,
 )
-from .scenes import (
-    Scene as Scene,
-    mesh_problem as mesh_problem,
-    mesh_scene as mesh_scene,
-    read_mesh_problem as read_mesh_problem,
-    read_mesh_scene as read_mesh_scene,
-)
+from .scenes import Scene as Scene
 from .solid_problems import (
     facet_forces as facet_forces,
     solid_body_forces as solid_body_forces,

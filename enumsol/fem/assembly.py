@@ -374,7 +374,7 @@ def basis_contact_problem(
         )
     fixed = _held(held, dofs.size)
     moved = np.where(fixed, _vector(displacements, "displacements", dofs.size), 0.0)
-    supports = Supports(fixed[dofs], moved[dofs])
+    supports = Supports(fixed[dofs], moved[dofs], np.zeros(dofs.shape, dtype=bool))
     facets = _facets(basis.mesh, contact)
     touching = _touching(basis, facets, dofs)
     _check_pressed(basis, facets, dofs, touching)

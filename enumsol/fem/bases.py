@@ -28,10 +28,6 @@ if TYPE_CHECKING:
 
 #: An area or volume below this share of the squared or cubed extent of its cell is rounding.
 FLAT = 1e-14
-#: Degree of the quadrature on facets: tractions and normals of quadratic curved edges.
-FACET_DEGREE = 5
-#: scikit-fem assembles cells with more functions than that by a long loop over their pairs.
-_FEW = 24
 #: Quadrature of degree two on triangles, at the nodes between corners: the nodes that can be in contact.
 _BETWEEN = (np.array([[0.5, 0.5, 0.0], [0.0, 0.5, 0.5]]), np.full(3, 1 / 6))
 
@@ -201,7 +197,7 @@ class NodalBasis:
 
         def of_block(block: Block) -> Any:
             own = first[block.rows], second[block.rows]
-            if block.basis.Nbfun > _FEW:
+            if block.basis.Nbfun > 24:  # scikit-fem has a long loop over pairs of functions
                 return _solid_stiffness(block.basis, *own)
             if uniform and self.shape[1] == 2:
                 return linear_elasticity(float(first[0]), float(second[0])).assemble(block.basis)
@@ -282,7 +278,7 @@ def facet_basis(basis: CellBasis, facets: Integers, *, lumped: bool = False) -> 
 
     if lumped and between_corners(basis.elem):
         return FacetBasis(basis.mesh, basis.elem, facets=facets, quadrature=_BETWEEN)
-    return FacetBasis(basis.mesh, basis.elem, facets=facets, intorder=FACET_DEGREE)
+    return FacetBasis(basis.mesh, basis.elem, facets=facets, intorder=5)  # normals of quadratic curved edges
 
 
 def between_corners(element: object) -> bool:

@@ -23,7 +23,6 @@ from enumsol.support.arguments import finite_number, one_of, shown
 from enumsol.support.array_arguments import real_array, short_vector
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
     from typing import Literal
 
     from skfem import DiscreteField
@@ -54,6 +53,7 @@ class Options:
     pairs: Sequence[Sequence[Any]]
     plane: Plane | Mapping[str, Plane] | None
     thickness: float | Mapping[str, float]
+    density: float | Mapping[str, float] | None
     friction: Coefficients
     friction_slope: Coefficients
     friction2: Coefficients
@@ -183,109 +183,70 @@ def by_part(value: object, name: str) -> dict[str, Any]:
 # -- supports --------------------------------------------------------------------------------------------------------
 
 
-class Held:
-    """Displacements that are given, collected part by part.
+def supports_of(mesh: PartedMesh, options: Options) -> Supports:
+    """Displacements that the options clamp, symmetry and displacement give.
 
-    Parameters
-    ----------
-    mesh : PartedMesh
+    Raises
+    ------
+    InvalidArgumentError
+        One names no part or is not of its form, or they contradict each other.
     """
-
-    def __init__(self, mesh: PartedMesh) -> None:
-        self._mesh = mesh
-        self._fixed = np.zeros(mesh.points.shape, dtype=bool)
-        self._values = np.zeros(mesh.points.shape)
-        #: Components across a plane of symmetry.
-        self.mirrored = np.zeros(mesh.points.shape, dtype=bool)
-
-    @classmethod
-    def of(cls, mesh: PartedMesh, options: Options) -> Held:
-        """Displacements that the options clamp, symmetry and displacement give.
-
-        Raises
-        ------
-        InvalidArgumentError
-            One names no part or is not of its form, or they contradict each other.
-        """
-        held = cls(mesh)
-        for part in names_of(options.clamp, "clamp"):
-            held.clamp(part)
-        for part in names_of(options.symmetry, "symmetry"):
-            held.mirror(part)
-        for part, value in by_part(options.displacement, "displacement").items():
-            held.displace(part, value)
-        return held
-
-    @property
-    def supports(self) -> Supports:
-        """All of them."""
-        return Supports(self._fixed, self._values)
-
-    def clamp(self, part: str) -> None:
-        """Hold the nodes of a part."""
-        for component in range(self._mesh.points.shape[1]):
-            self._fix(part, self._mesh.nodes(part), component, 0.0)
-
-    def displace(self, part: str, value: object) -> None:
-        """Move the nodes of a part by given components; ``free`` or None leaves one free.
-
-        Raises
-        ------
-        InvalidArgumentError
-            The components are not of that form, or contradict what already holds a node.
-        """
-        dimension = self._mesh.points.shape[1]
-        name, nodes = f"displacement of {part}", self._mesh.nodes(part)
-        if not isinstance(value, (list, tuple, np.ndarray)) or len(value) != dimension:
-            raise InvalidArgumentError(
-                f"{name} is {shown(value)}; expected {dimension} components, each a number or {FREE!r}"
-            )
-        given = {
-            component: finite_number(entry, name)
-            for component, entry in enumerate(value)
-            if entry is not None and not (isinstance(entry, str) and entry == FREE)
-        }
-        for component, entry in given.items():
-            self._fix(part, nodes, component, entry)
-        # rollers in a plane are a plane of symmetry, however they are given
-        if len(given) == 1 and 0.0 in given.values() and self._flat(nodes) == [*given]:
-            self.mirrored[nodes, next(iter(given))] = True
-
-    def mirror(self, part: str) -> None:
-        """Hold the nodes of a part in the direction of the axis that it is perpendicular to.
-
-        Raises
-        ------
-        InvalidArgumentError
-            There is no such axis, or several.
-        """
-        nodes = self._mesh.nodes(part)
-        flat = self._flat(nodes)
+    shape = mesh.points.shape
+    found = Supports(np.zeros(shape, dtype=bool), np.zeros(shape), np.zeros(shape, dtype=bool))
+    for part in names_of(options.clamp, "clamp"):
+        for component in range(shape[1]):
+            _fix(found, part, mesh.nodes(part), component, 0.0)
+    for part in names_of(options.symmetry, "symmetry"):
+        nodes = mesh.nodes(part)
+        flat = _flat(mesh, nodes)
         if len(flat) != 1:
             where = "no plane" if len(flat) == 0 else f"{len(flat)} planes"
             raise InvalidArgumentError(
                 f"symmetry {part} lies in {where} perpendicular to an axis; expected a part of the boundary in one "
                 "such plane"
             )
-        self._fix(part, nodes, flat[0], 0.0)
-        self.mirrored[nodes, flat[0]] = True
+        _fix(found, part, nodes, flat[0], 0.0)
+        found.mirrored[nodes, flat[0]] = True
+    for part, value in by_part(options.displacement, "displacement").items():
+        nodes, given = mesh.nodes(part), _components(value, f"displacement of {part}", shape[1])
+        for component, entry in given.items():
+            _fix(found, part, nodes, component, entry)
+        # rollers in a plane are a plane of symmetry, however they are given
+        if len(given) == 1 and 0.0 in given.values() and _flat(mesh, nodes) == [*given]:
+            found.mirrored[nodes, next(iter(given))] = True
+    return found
 
-    def _flat(self, nodes: Integers) -> list[int]:
-        """Axes to which a plane through all of these nodes is perpendicular."""
-        points = self._mesh.points
-        extent = float(np.max(np.ptp(points, axis=0)))
-        return np.flatnonzero(np.ptp(points[nodes], axis=0) <= SAME * extent).tolist()
 
-    def _fix(self, part: str, nodes: Integers, component: int, value: float) -> None:
-        differ = self._fixed[nodes, component] & (self._values[nodes, component] != value)
-        if np.any(differ):
-            node = int(nodes[np.argmax(differ)])
-            raise InvalidArgumentError(
-                f"{part} moves node {node} by {value:g} in {'xyz'[component]}, and another part that shares it by "
-                f"{self._values[node, component]:g}; expected one displacement"
-            )
-        self._fixed[nodes, component] = True
-        self._values[nodes, component] = value
+def _components(value: object, name: str, dimension: int) -> dict[int, float]:
+    """The components of a displacement that are given; ``free`` or None leaves one free."""
+    if not isinstance(value, (list, tuple, np.ndarray)) or len(value) != dimension:
+        raise InvalidArgumentError(
+            f"{name} is {shown(value)}; expected {dimension} components, each a number or {FREE!r}"
+        )
+    return {
+        component: finite_number(entry, name)
+        for component, entry in enumerate(value)
+        if entry is not None and not (isinstance(entry, str) and entry == FREE)
+    }
+
+
+def _flat(mesh: PartedMesh, nodes: Integers) -> list[int]:
+    """Axes to which a plane through all of these nodes is perpendicular."""
+    extent = float(np.max(np.ptp(mesh.points, axis=0)))
+    return np.flatnonzero(np.ptp(mesh.points[nodes], axis=0) <= SAME * extent).tolist()
+
+
+def _fix(supports: Supports, part: str, nodes: Integers, component: int, value: float) -> None:
+    fixed, values = supports.fixed, supports.values
+    differ = fixed[nodes, component] & (values[nodes, component] != value)
+    if np.any(differ):
+        node = int(nodes[np.argmax(differ)])
+        raise InvalidArgumentError(
+            f"{part} moves node {node} by {value:g} in {'xyz'[component]}, and another part that shares it by "
+            f"{values[node, component]:g}; expected one displacement"
+        )
+    fixed[nodes, component] = True
+    values[nodes, component] = value
 
 
 @dataclass(frozen=True)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -10,14 +11,16 @@ import scipy.sparse as sp
 
 from enumsol.errors import InvalidArgumentError
 from enumsol.fem.assembly import outward_normal, pressed
-from enumsol.fem.conditions import Held, Obstacle, names_of
+from enumsol.fem.conditions import Obstacle, names_of
 from enumsol.fem.meshes import unit_vectors
-from enumsol.fem.restrained import ContactRows, means_of_nodes, movable
+from enumsol.fem.restrained import ContactRows, Supports, means_of_nodes, movable
 from enumsol.model.cells import KINDS, boundary_facets, contact_nodes, facet_rows
 from enumsol.support.arguments import finite_number, shown
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
+
+    from skfem.element import Element
 
     from enumsol.fem.bases import NodalBasis
     from enumsol.fem.conditions import Options
@@ -36,10 +39,6 @@ _TOUCHING = 1e-9
 _STEPS = 30
 #: Steps in places of the reference below this have converged.
 _CONVERGED = 1e-13
-#: How much farther than its farthest node a curved facet may reach from its centre.
-_BULGE = 1.5
-#: Elements of edges, by their number of nodes.
-_LINES = {2: "ElementLineP1", 3: "ElementLineP2"}
 
 
 @dataclass(frozen=True)
@@ -157,7 +156,7 @@ class Contacts:
     groups: list[Group]
 
 
-def contacts_of(body: NodalBasis, mesh: PartedMesh, options: Options, held: Held) -> Contacts:
+def contacts_of(body: NodalBasis, mesh: PartedMesh, options: Options, held: Supports) -> Contacts:
     """Contact nodes on the facets of parts, and of the first part of every pair.
 
     A node that several of them share belongs to the contact parts, or to the first pair.
@@ -223,7 +222,7 @@ def _group(
     mesh: PartedMesh,
     parts: list[str],
     facets: Integers,
-    held: Held,
+    held: Supports,
     obstacle: object,
     pair: Pair | None,
     taken: Integers,
@@ -233,7 +232,7 @@ def _group(
     touching = along(facets) if dimension == 2 else np.unique(contact_nodes(dimension, facets))
     shared = int(np.sum(np.isin(touching, taken)))
     touching = touching[~np.isin(touching, taken)]
-    if pair is None and np.all(held.supports.fixed[touching]):
+    if pair is None and np.all(held.fixed[touching]):
         raise InvalidArgumentError("contact has no node that clamp or displacement leave free; expected some")
     if not len(touching):
         raise InvalidArgumentError(
@@ -256,14 +255,14 @@ def _group(
                 f"expected {given.expected}"
             )
     if pair is None:
-        nodes = movable(touching, normals, held.supports)
+        nodes = movable(touching, normals, held)
         return nodes, gaps[nodes.kept], Group(parts, None, own[nodes.kept], len(nodes.nodes))
     rows, gaps, group = _paired(body, mesh, touching, normals, held, pair)
     return rows, gaps, replace(group, shared=shared)
 
 
 def _paired(
-    body: NodalBasis, mesh: PartedMesh, touching: Integers, normals: Floats, held: Held, pair: Pair
+    body: NodalBasis, mesh: PartedMesh, touching: Integers, normals: Floats, held: Supports, pair: Pair
 ) -> tuple[ContactRows, Floats, Group]:
     """Nodes that face the other part of a pair, relative to it."""
     facets = _facets(body, mesh, [pair.master])
@@ -271,17 +270,18 @@ def _paired(
     touching, normals = touching[apart], normals[apart]
     boundary = boundary_facets(mesh.points.shape[1], mesh.cells)
     others = boundary[np.isin(facet_rows(boundary, facets, facets.shape[1]), -1)]
-    seen = faced(mesh.points, touching, normals, facets, body.on_part(facets, pair.master, outward_normal), others)
-    if not len(seen.gaps):
+    outward = body.on_part(facets, pair.master, outward_normal)
+    found, weights, distances = faced(mesh.points, touching, normals, facets, outward, others)
+    if not len(distances):
         raise InvalidArgumentError(
             f"{pair.slave} of the pair {pair} has no node that faces a facet of {pair.master} along its normal; "
             "expected parts of two bodies, which share no nodes, that face each other with opposite normals"
         )
-    missed = int(np.sum(~seen.found))
-    touching, normals = touching[seen.found], normals[seen.found]
-    means = sp.csr_array(means_of_nodes(touching, len(mesh.points)) - seen.weights)
-    nodes = movable(touching, normals, held.supports, means)
-    gaps = seen.gaps if pair.gap is None else np.full(len(touching), pair.gap)
+    missed = int(np.sum(~found))
+    touching, normals = touching[found], normals[found]
+    means = sp.csr_array(means_of_nodes(touching, len(mesh.points)) - weights)
+    nodes = movable(touching, normals, held, means)
+    gaps = distances if pair.gap is None else np.full(len(touching), pair.gap)
     return nodes, gaps[nodes.kept], Group([pair.slave], pair, normals[nodes.kept], len(nodes.nodes), missed)
 
 
@@ -305,29 +305,19 @@ def along(edges: Integers) -> Integers:
 # -- what the nodes of one part of a pair face on the other (theory, section 11.8) -------------------------------------
 
 
-@dataclass(frozen=True)
-class Faced:
-    """What nodes face along their normals.
+def faced(
+    points: Floats, nodes: Integers, normals: Floats, facets: Integers, outward: Floats, others: Integers
+) -> tuple[Mask, sp.csr_array, Floats]:
+    """The nearest points of facets on the lines along the normals of nodes.
 
-    Attributes
-    ----------
+    Returns
+    -------
     found : (k,) bool array
         Which of the nodes face a facet at all; the p of them are the rows of what follows.
     weights : (p, N) csr_array
         Shape functions of the facet at the point that is faced.
     gaps : (p,) array
         Signed distances along the normals, negative where a node is inside the other body [length].
-    """
-
-    found: Mask
-    weights: sp.csr_array
-    gaps: Floats
-
-
-def faced(
-    points: Floats, nodes: Integers, normals: Floats, facets: Integers, outward: Floats, others: Integers
-) -> Faced:
-    """The nearest points of facets on the lines along the normals of nodes.
 
     Parameters
     ----------
@@ -357,7 +347,7 @@ def faced(
                 _, crossed, _ = between.on_line(points[node], normal, tolerance)
                 if np.any((crossed < -tolerance) & (crossed > gap[hit] + tolerance)):
                     continue
-            values = targets.shape.values(at[hit][None])[:, 0]
+            values = targets.values(at[hit][None])[:, 0]
             values[np.abs(values) < _AT_NODE] = 0.0
             kept = np.flatnonzero(values)
             rows.append(np.full(len(kept), len(gaps)))
@@ -367,51 +357,9 @@ def faced(
             found[k] = True
             break
     if not gaps:
-        return Faced(found, sp.csr_array((0, len(points))), np.zeros(0))
+        return found, sp.csr_array((0, len(points))), np.zeros(0)
     entries = (np.concatenate(data), (np.concatenate(rows), np.concatenate(columns)))
-    return Faced(found, sp.csr_array(entries, shape=(len(gaps), len(points))), np.array(gaps))
-
-
-@dataclass(frozen=True)
-class _Shape:
-    """The reference of a kind of facets.
-
-    Attributes
-    ----------
-    element : of scikit-fem
-    centre : (d - 1,) array
-    triangle : whether coordinates add up to at most one, as on an edge
-    """
-
-    element: Any
-    centre: Floats
-    triangle: bool
-
-    @classmethod
-    def of(cls, dimension: int, nodes: int) -> _Shape:
-        """Facing of edges, or of facets of solids."""
-        import skfem  # as in nodal_basis
-
-        if dimension == 2:
-            return cls(getattr(skfem, _LINES[nodes])(), np.array([0.5]), triangle=True)
-        kind = KINDS[2, nodes]
-        triangle = kind.corners == 3
-        return cls(getattr(skfem, kind.element)(), np.full(2, 1 / 3 if triangle else 0.5), triangle)
-
-    def values(self, places: Floats) -> Floats:
-        """Shape functions (m, q) at places (q, d - 1)."""
-        count = len(self.element.doflocs)
-        return np.stack([np.broadcast_to(self.element.lbasis(places.T, i)[0], len(places)) for i in range(count)])
-
-    def slopes(self, places: Floats) -> Floats:
-        """Their derivatives (m, d - 1, q)."""
-        count = len(self.element.doflocs)
-        return np.stack([np.broadcast_to(self.element.lbasis(places.T, i)[1], places.T.shape) for i in range(count)])
-
-    def inside(self, places: Floats) -> Mask:
-        """Which places belong to the facet, but for rounding."""
-        sums = places.sum(axis=1) if self.triangle else np.max(places, axis=1)
-        return np.asarray(np.all(places >= -_BEYOND, axis=1) & (sums <= 1 + _BEYOND))
+    return found, sp.csr_array(entries, shape=(len(gaps), len(points))), np.array(gaps)
 
 
 @dataclass(frozen=True)
@@ -420,26 +368,57 @@ class _Facets:
 
     Attributes
     ----------
-    shape : _Shape
+    element : of scikit-fem
+    triangle : whether coordinates in the reference add up to at most one, as on an edge
+    centre : (d - 1,) array
+        Of the reference.
     places : (m, c, d) array
-        Of their nodes.
-    centres : (m, d) array
-    reach : (m,) array
-        No point of a facet is farther from its centre.
+        Of the nodes.
     """
 
-    shape: _Shape
+    element: Element
+    triangle: bool
+    centre: Floats
     places: Floats
-    centres: Floats
-    reach: Floats
 
     @classmethod
     def of(cls, points: Floats, facets: Integers) -> _Facets:
-        """Facing of these nodes."""
-        shape, places = _Shape.of(points.shape[1], facets.shape[1]), points[facets]
-        centres = np.einsum("m,fmd->fd", shape.values(shape.centre[None])[:, 0], places)
-        far = np.max(np.linalg.norm(places - centres[:, None], axis=2), axis=1, initial=0.0)
-        return cls(shape, places, centres, _BULGE * far)
+        """Facets of these nodes, edges or facets of solids."""
+        import skfem  # as in nodal_basis
+
+        if points.shape[1] == 2:
+            element = {2: skfem.ElementLineP1, 3: skfem.ElementLineP2}[facets.shape[1]]()
+            return cls(element, True, np.array([0.5]), points[facets])
+        kind = KINDS[2, facets.shape[1]]
+        triangle = kind.corners == 3
+        centre = np.full(2, 1 / 3 if triangle else 0.5)
+        return cls(getattr(skfem, kind.element)(), triangle, centre, points[facets])
+
+    def values(self, places: Floats) -> Floats:
+        """Shape functions (c, q) at places (q, d - 1) of the reference."""
+        every = (self.element.lbasis(places.T, i)[0] for i in range(self.places.shape[1]))
+        return np.stack([np.broadcast_to(values, len(places)) for values in every])
+
+    def slopes(self, places: Floats) -> Floats:
+        """Their derivatives (c, d - 1, q)."""
+        every = (self.element.lbasis(places.T, i)[1] for i in range(self.places.shape[1]))
+        return np.stack([np.broadcast_to(slopes, places.T.shape) for slopes in every])
+
+    def inside(self, places: Floats) -> Mask:
+        """Which places of the reference belong to the facet, but for rounding."""
+        sums = places.sum(axis=1) if self.triangle else np.max(places, axis=1)
+        return np.asarray(np.all(places >= -_BEYOND, axis=1) & (sums <= 1 + _BEYOND))
+
+    @cached_property
+    def centres(self) -> Floats:
+        """Centres of the facets, (m, d)."""
+        return np.asarray(np.einsum("m,fmd->fd", self.values(self.centre[None])[:, 0], self.places))
+
+    @cached_property
+    def reach(self) -> Floats:
+        """No point of a facet is farther from its centre, (m,); a curved one reaches beyond its farthest node."""
+        far = np.max(np.linalg.norm(self.places - self.centres[:, None], axis=2), axis=1, initial=0.0)
+        return np.asarray(1.5 * far)
 
     def on_line(self, point: Floats, normal: Floats, tolerance: float) -> tuple[Floats, Floats, Integers]:
         """Places in facets where a line meets them, by Newton's method, distances along it, and which facets."""
@@ -447,16 +426,16 @@ class _Facets:
         ahead = offset @ normal
         across = np.linalg.norm(offset - ahead[:, None] * normal, axis=1)
         near = np.flatnonzero(across <= self.reach)
-        at, gap, facets = np.tile(self.shape.centre, (len(near), 1)), ahead[near], self.places[near]
+        at, gap, facets = np.tile(self.centre, (len(near), 1)), ahead[near], self.places[near]
         direction = np.broadcast_to(-normal[:, None], (len(near), len(normal), 1))
 
         def left() -> Floats:
-            reached = np.einsum("mq,qmd->qd", self.shape.values(at), facets)
+            reached = np.einsum("mq,qmd->qd", self.values(at), facets)
             return np.asarray(reached - point - gap[:, None] * normal)
 
         with np.errstate(all="ignore"):  # what diverges is not taken
             for _ in range(_STEPS if len(near) else 0):
-                tangents = np.einsum("mkq,qmd->qdk", self.shape.slopes(at), facets)
+                tangents = np.einsum("mkq,qmd->qdk", self.slopes(at), facets)
                 J, off = np.concatenate([tangents, direction], axis=2), left()
                 # where the line is parallel to the facet, or nearly, it goes astray
                 flat = ~(np.abs(np.linalg.det(J)) > _AT_NODE * np.prod(np.linalg.norm(J, axis=1), axis=1))
@@ -465,5 +444,5 @@ class _Facets:
                 at, gap = np.clip(at + step[:, :-1], -2.0, 3.0), gap + step[:, -1]
                 if np.max(np.abs(step[:, :-1])) < _CONVERGED:
                     break
-            met = np.flatnonzero(self.shape.inside(at) & (np.linalg.norm(left(), axis=1) <= tolerance))
+            met = np.flatnonzero(self.inside(at) & (np.linalg.norm(left(), axis=1) <= tolerance))
         return at[met], gap[met], near[met]

@@ -24,8 +24,6 @@ from enumsol.support.array_types import ArrayLike, Floats, Integers, Mask
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
-    from enumsol.support.array_types import ArrayLike, Floats, Integers
-
     Cells = Literal["hexahedra", "tetrahedra"]
 
 
@@ -75,9 +73,7 @@ class PartedMesh:
         InvalidArgumentError
             There are none.
         """
-        if name not in self.bodies:
-            raise self._unknown(name, "cells", self.bodies)
-        return self.bodies[name]
+        return self._named(name, "cells", self.bodies)
 
     def part(self, name: str) -> Integers:
         """Facets of this name.
@@ -87,9 +83,7 @@ class PartedMesh:
         InvalidArgumentError
             There are none.
         """
-        if name not in self.facets:
-            raise self._unknown(name, "facets", self.facets)
-        return self.facets[name]
+        return self._named(name, "facets", self.facets)
 
     def nodes(self, name: str) -> Integers:
         """Nodes of this name, or of the facets of this name, in order.
@@ -99,15 +93,12 @@ class PartedMesh:
         InvalidArgumentError
             There are none.
         """
-        if name in self.node_sets:
-            return np.unique(self.node_sets[name])
-        if name not in self.facets:
-            raise self._unknown(
-                name, "facets or nodes" if self.node_sets else "facets", {**self.facets, **self.node_sets}
-            )
-        return np.unique(self.facets[name])
+        what = "facets or nodes" if self.node_sets else "facets"
+        return np.unique(self._named(name, what, {**self.facets, **self.node_sets}))
 
-    def _unknown(self, name: str, what: str, known: Mapping[str, object]) -> InvalidArgumentError:
+    def _named(self, name: str, what: str, known: Mapping[str, Integers]) -> Integers:
+        if name in known:
+            return known[name]
         close = difflib.get_close_matches(str(name), known, n=1)
         several = [part for part in re.split(r"[\s,;]+", str(name)) if part]
         hint = f" (did you mean {close[0]}?)" if close else ""
@@ -117,7 +108,7 @@ class PartedMesh:
             hint = " (the file names no parts of its boundary; in gmsh physical groups do)"
         elif what == "cells":
             hint = hint or " (in gmsh, physical groups of surfaces, in 3D of volumes, name parts of the body)"
-        return InvalidArgumentError(
+        raise InvalidArgumentError(
             f"the mesh has no {what} named {shown(name)}; expected one of {', '.join(known) or 'none'}{hint}"
         )
 

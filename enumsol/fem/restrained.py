@@ -9,6 +9,7 @@ zero in every solution, and so is the tangential force along it. All builders of
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from itertools import combinations
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -41,10 +42,13 @@ class Supports:
     fixed : (N, dimension) bool array
     values : (N, dimension) array
         Displacements of the fixed components, 0 elsewhere [length].
+    mirrored : (N, dimension) bool array
+        Components across a plane of symmetry, where that is known.
     """
 
     fixed: Mask
     values: Floats
+    mirrored: Mask
 
 
 @dataclass(frozen=True)
@@ -162,7 +166,7 @@ class Body:
             A = sp.csc_array(A + sp.diags_array(spring_stiffnesses(springs, held.shape).ravel()))
         f = nodal_vectors(forces, "forces", held.shape)
         load_slope = None if slope is None else nodal_vectors(slope, "forces_slope", held.shape)
-        return cls(A, f, load_slope, Supports(held, np.zeros(held.shape)))
+        return cls(A, f, load_slope, Supports(held, np.zeros(held.shape), np.zeros_like(held)))
 
 
 def displacements_along(means: sp.csr_array, directions: Floats, dofs: Integers, left: Integers) -> sp.csr_array:
@@ -190,18 +194,13 @@ def plain_dofs(shape: tuple[int, ...]) -> Integers:
     return np.arange(shape[0] * shape[1]).reshape(shape)
 
 
-#: Cosine of the angle between axes that are perpendicular up to rounding, by dimension.
-_SKEW = {2: 1e-12, 3: 1e-10}
-#: Normals nearer to the x axis than this cosine take the y axis for the default of t1.
-_NEAR_X = 0.9
-
-
 def problem_of(
     body: Body,
     contact: ContactRows,
     axes: tuple[Floats, ...],
     mesh: Callable[[Integers], BodyMesh] | None = None,
     modes: Floats | None = None,
+    mass: sp.csc_array | None = None,
     **more: Any,
 ) -> AnyProblem:
     """Problem of a body with these contact rows, by the degrees of freedom that are left, in the order of its rows.
@@ -216,6 +215,8 @@ def problem_of(
         What the problem keeps of its mesh, from the degrees of freedom that are left.
     modes : (d N, r) array or None
         Rigid motions that nothing holds.
+    mass : (d N, d N) csc_array or None
+        Of all degrees of freedom.
     **more
         As in `ContactProblem` and `ContactProblem3D`.
 
@@ -244,6 +245,9 @@ def problem_of(
     if np.any(uncoupled):
         coupled = sp.diags_array(kept)
         A = sp.csc_array(coupled @ A @ coupled + sp.diags_array(np.where(kept == 0, A.diagonal(), 0.0)))
+    if mass is not None:
+        coupled, own = sp.diags_array(kept), sp.csc_array(mass[left][:, left])
+        more["mass"] = sp.csc_array(coupled @ own @ coupled + sp.diags_array(np.where(kept == 0, own.diagonal(), 0.0)))
     rows = (displacements_along(contact.means, axis, dofs, left) for axis in (contact.normals, *axes))
     arrays: tuple[Any, ...] = (A, *rows, kept * load[left])
     more["load_slope"] = None if body.load_slope is None else kept * body.load_slope[left]
@@ -270,34 +274,26 @@ def axes_of(tangents: Tangents, normals: Floats) -> tuple[Floats, ...]:
     InvalidArgumentError
         They have the wrong shape or are not perpendicular to the normals and to each other.
     """
-    return _plane_axes(tangents, normals) if normals.shape[1] == 2 else _space_axes(tangents, normals)
+    plane = normals.shape[1] == 2
+    if tangents is None:
+        return (np.stack([-normals[:, 1], normals[:, 0]], axis=1),) if plane else default_axes(normals)
+    given: list[Any] = [tangents] if plane else list(tangents) if isinstance(tangents, (tuple, list)) else []
+    if len(given) != normals.shape[1] - 1:
+        raise InvalidArgumentError(f"tangents is {shown(tangents)}; expected a pair of directions (t1, t2)")
+    axes = tuple(unit_vectors(vectors_of_all(axis, "tangents", normals.shape), "tangents") for axis in given)
+    skew = np.max([np.abs(np.sum(a * b, axis=1)) for a, b in combinations((*axes, normals), 2)], axis=0)
+    if np.any(skew > (1e-12 if plane else 1e-10)):  # but for rounding
+        k = int(np.argmax(skew))
+        raise InvalidArgumentError(
+            f"tangents row {k} is not perpendicular to normals row {k}; expected right angles"
+            if plane
+            else "tangents are not perpendicular to each other and to the normals"
+        )
+    return axes
 
 
 def default_axes(normal: Floats) -> tuple[Floats, Floats]:
     """Axes t1, t2 for normals (p, 3): the x axis projected, or the y axis where the normal is near the x axis."""
-    start = np.where(np.abs(normal[:, :1]) > _NEAR_X, [[0.0, 1.0, 0.0]], [[1.0, 0.0, 0.0]])
+    start = np.where(np.abs(normal[:, :1]) > 0.9, [[0.0, 1.0, 0.0]], [[1.0, 0.0, 0.0]])
     first = unit_vectors(start - np.sum(start * normal, axis=1)[:, None] * normal, "axes")
     return first, np.cross(normal, first)
-
-
-def _plane_axes(tangents: Tangents, normal: Floats) -> tuple[Floats]:
-    if tangents is None:
-        return (np.stack([-normal[:, 1], normal[:, 0]], axis=1),)
-    tangent = unit_vectors(vectors_of_all(tangents, "tangents", normal.shape), "tangents")
-    skew = np.abs(np.sum(tangent * normal, axis=1))
-    if np.any(skew > _SKEW[2]):
-        k = int(np.argmax(skew))
-        raise InvalidArgumentError(f"tangents row {k} is not perpendicular to normals row {k}; expected right angles")
-    return (tangent,)
-
-
-def _space_axes(tangents: Tangents, normal: Floats) -> tuple[Floats, Floats]:
-    if tangents is None:
-        return default_axes(normal)
-    if not (isinstance(tangents, (tuple, list)) and len(tangents) == 2):
-        raise InvalidArgumentError(f"tangents is {shown(tangents)}; expected a pair of directions (t1, t2)")
-    one, two = (unit_vectors(vectors_of_all(axis, "tangents", normal.shape), "tangents") for axis in tangents)
-    products = [np.sum(a * b, axis=1) for a, b in ((one, two), (one, normal), (two, normal))]
-    if np.max(np.abs(products)) > _SKEW[3]:
-        raise InvalidArgumentError("tangents are not perpendicular to each other and to the normals")
-    return one, two

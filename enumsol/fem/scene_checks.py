@@ -14,7 +14,7 @@ from enumsol.fem.conditions import holding
 from enumsol.fem.contacts import Group, faced
 from enumsol.fem.file_counts import taken_as
 from enumsol.fem.meshes import SAME, PartedMesh, cell_name, unit_vectors
-from enumsol.fem.scene_data import SceneData
+from enumsol.fem.scenes import Scene
 from enumsol.model.cells import boundary_facets
 from enumsol.support.array_types import Floats, Integers, Mask
 from enumsol.support.messages import counted
@@ -24,30 +24,16 @@ from enumsol.support.messages import counted
 _INSIDE = 1e-3
 #: Share of the contact nodes of a part that may touch another body before that is refused as a wall between both.
 _WALL = 0.5
-#: Press fits, and given displacements, above these parts of the extent of the largest body are not small.
-_FIT, _SMALL = 0.05, 0.25
-#: A node that is deeper in what it faces than this share of a facet faces it through the body.
-_DEEP = 0.5
-#: Strains by loads above this come from wrong units: the length of the body.
-_ABSURD = 1.0
-#: Loads that strain the body by less than this are hardly intended.
-_NOTHING = 1e-12
-#: Normals of a pair that turn away by more than this from those they face make a pocket [degrees].
-_TURN = 10.0
 #: Loads and press fits that strain the body so differently are hardly in the same units.
 _UNEVEN = 1e5
-#: Coefficients of friction above this are rare.
-_STEEP = 5.0
-#: A ratio of moduli above this is often a wrong unit.
-_UNLIKE = 1e8
 
 
-def _bodies(scene: SceneData) -> Integers:
+def _bodies(scene: Scene) -> Integers:
     """Number of the connected body of each node, (N,)."""
     return np.asarray(np.argmax([piece.nodes for piece in scene.pieces], axis=0))
 
 
-def refuse_overlaps(scene: SceneData) -> None:
+def refuse_overlaps(scene: Scene) -> None:
     """Refuse meshes in which cells of one connected body overlap, but for parts of bodies that are a pair.
 
     As cells that share a facet are on different sides of it (`fem.bases.refuse_wrong_sides`), a body can overlap itself
@@ -99,7 +85,7 @@ def _refuse_covered(mesh: PartedMesh, own: tuple[Integers, Integers], facets: In
                 )
 
 
-def refuse_walls(scene: SceneData) -> None:
+def refuse_walls(scene: Scene) -> None:
     """Refuse contact parts where another body touches them: the foundation would be a wall between the two.
 
     Raises
@@ -122,12 +108,12 @@ def refuse_walls(scene: SceneData) -> None:
         if not np.any(own):
             continue
         outward = scene.body.on_part(others, "boundary", outward_normal)
-        seen = faced(mesh.points, nodes[own], group.normals[own], others, outward, others[:0])
-        touching = nodes[own][seen.found][seen.gaps == 0.0]
+        found, weights, gaps = faced(mesh.points, nodes[own], group.normals[own], others, outward, others[:0])
+        touching = nodes[own][found][gaps == 0.0]
         for part in group.parts:
             here = np.intersect1d(touching, mesh.nodes(part))
             if len(here) > _WALL * np.sum(np.isin(nodes[own], mesh.nodes(part))):
-                beside = np.unique(seen.weights[np.flatnonzero(seen.gaps == 0.0)].indices)
+                beside = np.unique(weights[np.flatnonzero(gaps == 0.0)].indices)
                 names = [name for name, rows in mesh.facets.items() if np.all(np.isin(beside, rows))]
                 other = names[0] if names else "OTHER"
                 touched = f"those of {other}" if names else "the boundary of another body"
@@ -137,7 +123,7 @@ def refuse_walls(scene: SceneData) -> None:
                 )
 
 
-def refuse_pairs(scene: SceneData) -> None:
+def refuse_pairs(scene: Scene) -> None:
     """Refuse pairs of two sides of one body that face away from each other, through the body.
 
     Raises
@@ -154,9 +140,9 @@ def refuse_pairs(scene: SceneData) -> None:
         if group.pair is None:
             continue
         facets = mesh.part(group.pair.master)
-        # nodes of faces of a crack may be a little beyond the other face where that is curved
+        # nodes of faces of a crack may be a little beyond the other face where that is curved: less than half a facet
         length = np.max(np.ptp(mesh.points[facets], axis=1))
-        deep = np.sum(places[own] * group.normals, axis=1) > _DEEP * length
+        deep = np.sum(places[own] * group.normals, axis=1) > 0.5 * length
         faced = body[facets.ravel()]
         if np.any(deep) and np.all(np.isin(faced, body[rows.nodes[own][deep]])) and len(np.unique(faced)) == 1:
             raise InvalidArgumentError(
@@ -165,7 +151,7 @@ def refuse_pairs(scene: SceneData) -> None:
             )
 
 
-def _refuse_cracks(scene: SceneData, nodes: Integers, parts: list[str]) -> None:
+def _refuse_cracks(scene: Scene, nodes: Integers, parts: list[str]) -> None:
     """Refuse parts that are a face of a crack: nodes of the same body are where theirs are."""
     from scipy.spatial import cKDTree  # not needed for paths that read no mesh
 
@@ -190,7 +176,7 @@ def _refuse_cracks(scene: SceneData, nodes: Integers, parts: list[str]) -> None:
             )
 
 
-def scene_notes(scene: SceneData) -> list[str]:
+def scene_notes(scene: Scene) -> list[str]:
     """Notes on what may not have been intended."""
     checks = (
         *(_formulations, _unjoined, _unfaced, _shared, _alone, _rest, _loaded_contact),
@@ -200,12 +186,12 @@ def scene_notes(scene: SceneData) -> list[str]:
         return [note for check in checks for note in check(scene)]
 
 
-def _formulations(scene: SceneData) -> list[str]:
+def _formulations(scene: Scene) -> list[str]:
     """Notes on elements of the file that others take the place of."""
     return taken_as(scene.mesh.types)
 
 
-def _unjoined(scene: SceneData) -> list[str]:
+def _unjoined(scene: Scene) -> list[str]:
     """Notes on nodes of the boundary at one place, but for those of contacts: cracks, and bodies that seem joined."""
     from scipy.spatial import cKDTree  # as above
 
@@ -241,10 +227,10 @@ def _nodes_of(mesh: PartedMesh, group: Group) -> Mask:
     return mask
 
 
-def _turning(scene: SceneData) -> list[str]:
+def _turning(scene: Scene) -> list[str]:
     """Notes on pairs of a body that could roll, whose normals turn along the contact more than what they face does."""
     mesh, notes, first = scene.mesh, [], 0
-    hold = holding(scene.held.supports, sp.csc_array(scene.springs.shape))
+    hold = holding(scene.held, sp.csc_array(scene.springs.shape))
     loose = np.any([piece.nodes for piece in scene.pieces if piece.free_motions(mesh.points, hold)], axis=0)
     for group in scene.contacts.groups:
         rows, first = scene.contacts.rows.means[first : first + group.count], first + group.count
@@ -254,7 +240,7 @@ def _turning(scene: SceneData) -> list[str]:
         outward = scene.body.on_part(mesh.part(pair.master), pair.master, outward_normal)
         facing = unit_vectors(np.asarray(sp.csr_array(-rows).maximum(0) @ outward), "normals of the other side")
         apart = float(np.degrees(np.max(np.arccos(np.clip(-np.sum(facing * group.normals, axis=1), -1.0, 1.0)))))
-        if apart > _TURN:
+        if apart > 10.0:  # degrees, of a pocket
             notes.append(
                 f"the normals of the pair {pair} turn along the contact, up to {apart:.0f} degrees away from the "
                 "normals of what they face: as they stay so, a body that could roll or slide along is caught as in a "
@@ -263,7 +249,7 @@ def _turning(scene: SceneData) -> list[str]:
     return notes
 
 
-def _unfaced(scene: SceneData) -> list[str]:
+def _unfaced(scene: Scene) -> list[str]:
     """Nodes of pairs without contact."""
     return [
         f"{group.missed} of {group.missed + group.count} nodes of {pair.slave} face nothing of "
@@ -273,7 +259,7 @@ def _unfaced(scene: SceneData) -> list[str]:
     ]
 
 
-def _shared(scene: SceneData) -> list[str]:
+def _shared(scene: Scene) -> list[str]:
     """Nodes of pairs that have the contact of another one."""
     return [
         f"{counted(group.shared, 'node')} of {pair.slave} {'belong' if group.shared > 1 else 'belongs'} to "
@@ -283,7 +269,7 @@ def _shared(scene: SceneData) -> list[str]:
     ]
 
 
-def _alone(scene: SceneData) -> list[str]:
+def _alone(scene: Scene) -> list[str]:
     """Bodies that nothing connects with the others."""
     if len(scene.pieces) < 2:
         return []
@@ -296,15 +282,15 @@ def _alone(scene: SceneData) -> list[str]:
     ]
 
 
-def _rest(scene: SceneData) -> list[str]:
+def _rest(scene: Scene) -> list[str]:
     """Nothing that acts on the bodies."""
-    acting = np.any(scene.forces) or np.any(scene.slope) or np.any(scene.held.supports.values)
+    acting = np.any(scene.forces) or np.any(scene.slope) or np.any(scene.held.values)
     if acting or np.any(scene.gaps < 0):
         return []
     return ["nothing acts on the body: it has no load, press fit or given displacement, and rests"]
 
 
-def _loaded_contact(scene: SceneData) -> list[str]:
+def _loaded_contact(scene: Scene) -> list[str]:
     """Loads on contact parts."""
     corners = {tuple(sorted(row)) for row in scene.contacts.facets.tolist()}
     notes = []
@@ -316,7 +302,7 @@ def _loaded_contact(scene: SceneData) -> list[str]:
     return notes
 
 
-def _reach(scene: SceneData) -> list[str]:
+def _reach(scene: Scene) -> list[str]:
     """Gaps and press fits as large as a body."""
     extent, notes = _extent(scene), []
     for group, gaps in scene.gaps_of_groups:
@@ -325,7 +311,7 @@ def _reach(scene: SceneData) -> list[str]:
                 f"the smallest gap of {group} is {gaps.min():.3g}, more than the extent {extent:.3g} of the body: it "
                 "will not be in contact"
             )
-        elif gaps.min() < -_FIT * extent:
+        elif gaps.min() < -0.05 * extent:
             notes.append(
                 f"the press fit of {group} is {-gaps.min():.3g}, which is not small beside the extent {extent:.3g} of "
                 "the body, as displacements have to be"
@@ -333,7 +319,7 @@ def _reach(scene: SceneData) -> list[str]:
     return notes
 
 
-def _strains(scene: SceneData) -> dict[str, float]:
+def _strains(scene: Scene) -> dict[str, float]:
     """Approximate strains of the body by the loads and by their slopes."""
     thickness = 1.0 if scene.body.thickness is None else float(np.min(scene.body.thickness))
     force = float(np.min(_stiffness(scene))) * _extent(scene) ** (scene.dimension - 1) * thickness
@@ -343,12 +329,12 @@ def _strains(scene: SceneData) -> dict[str, float]:
     }
 
 
-def _stiffness(scene: SceneData) -> Floats:
+def _stiffness(scene: Scene) -> Floats:
     """Moduli lambda + 2 mu of the cells."""
     return np.asarray(np.atleast_2d(scene.lame) @ (1.0, 2.0))
 
 
-def _proportions(scene: SceneData) -> list[str]:
+def _proportions(scene: Scene) -> list[str]:
     """Notes on loads and press fits, or gaps that only strain can close, that are out of proportion."""
     strain, extent, notes = max(_strains(scene).values()), _extent(scene), []
     held = not scene.options.spring and not any(p.free_motions(scene.mesh.points, scene.hold) for p in scene.pieces)
@@ -364,26 +350,26 @@ def _proportions(scene: SceneData) -> list[str]:
     return notes
 
 
-def _units(scene: SceneData) -> list[str]:
+def _units(scene: Scene) -> list[str]:
     """Loads, displacements and moduli of absurd size."""
     notes, extent, stiffness = [], _extent(scene), _stiffness(scene)
     for name, strain in _strains(scene).items():
-        if strain > _ABSURD:
+        if strain > 1.0:  # by the length of the body
             notes.append(
                 f"the {name} would strain the body by about {strain:.2g}, which is far from small; are young and "
                 f"the {name} in the same units?"
             )
-        elif 0 < strain < _NOTHING:
+        elif 0 < strain < 1e-12:
             notes.append(
                 f"the {name} would strain the body by about {strain:.2g}, which is next to nothing; are young and the "
                 f"{name} in the same units?"
             )
-    moved = float(np.max(np.abs(scene.held.supports.values)))
-    if moved > _SMALL * extent:
+    moved = float(np.max(np.abs(scene.held.values)))
+    if moved > 0.25 * extent:
         notes.append(
             f"a displacement of {moved:.3g} is given, which is not small beside the extent {extent:.3g} of the body"
         )
-    if np.max(stiffness) > _UNLIKE * np.min(stiffness):
+    if np.max(stiffness) > 1e8 * np.min(stiffness):
         notes.append(
             f"the moduli of parts differ by a factor of {np.max(stiffness) / np.min(stiffness):.2g}; are all in the "
             "same unit?"
@@ -391,23 +377,23 @@ def _units(scene: SceneData) -> list[str]:
     return notes
 
 
-def _extent(scene: SceneData) -> float:
+def _extent(scene: Scene) -> float:
     """Extent of the largest body [length]."""
     return max(float(np.max(np.ptp(scene.mesh.points[piece.nodes], axis=0))) for piece in scene.pieces)
 
 
-def _friction(scene: SceneData) -> list[str]:
+def _friction(scene: Scene) -> list[str]:
     """Coefficients that no pair of materials has."""
     notes = []
     for name, value in (("friction", scene.options.friction), ("friction2", scene.options.friction2)):
         each = value.values() if isinstance(value, Mapping) else [value]
         steep = max((float(own) for own in each if own is not None), default=0.0)
-        if steep > _STEEP:
+        if steep > 5.0:
             notes.append(f"{name} is {steep:g}; coefficients of friction above 1 are rare")
     return notes
 
 
-def _held(scene: SceneData) -> list[str]:
+def _held(scene: Scene) -> list[str]:
     """A bound of rigid displacements where nothing can move as a whole."""
     if scene.options.max_rigid_displacement is None:
         return []

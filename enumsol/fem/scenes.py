@@ -1,94 +1,156 @@
-"""From a mesh with named parts to its scene and its contact problem, by a call or by a TOML file.
-
-A body is of one material, or of one for each of its named parts.
-"""
+"""Scene: what a mesh and its options describe, as arrays by nodes, as a problem, in words and as a picture."""
 
 from __future__ import annotations
 
-import difflib
-import inspect
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import TYPE_CHECKING, Any, Literal, TypeVar
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import scipy.sparse as sp
 
-from enumsol.errors import InvalidArgumentError, InvalidProblemError
+from enumsol.errors import InvalidArgumentError
 from enumsol.fem import conditions
-from enumsol.fem.bases import nodal_basis
-from enumsol.fem.conditions import Options, refuse_old_friction
-from enumsol.fem.contacts import contacts_of
-from enumsol.fem.mesh_files import read_mesh
-from enumsol.fem.meshes import PartedMesh, lame, unit_vectors
-from enumsol.fem.restrained import Body, axes_of, problem_of
-from enumsol.fem.scene_checks import refuse_overlaps, refuse_pairs, refuse_walls, scene_notes
-from enumsol.fem.scene_data import SceneData, described, draw_scene, sections_of
+from enumsol.fem.bases import NodalBasis
+from enumsol.fem.conditions import FRICTION, Options
+from enumsol.fem.contacts import Contacts, Group
+from enumsol.fem.meshes import PartedMesh, unit_vectors
+from enumsol.fem.restrained import Body, Supports, axes_of, problem_of
+from enumsol.model.cells import KINDS, boundary_facets, by_kind, facet_outlines
+from enumsol.model.mass import consistent_mass
 from enumsol.model.mesh import BodyMesh
+from enumsol.model.problem import given_friction
 from enumsol.model.restart import afresh
-from enumsol.support.arguments import file_path, finite_number, one_of, positive_number, shown, text_of
+from enumsol.model.shapes import acting_nodes, signs
+from enumsol.support.arguments import finite_number, positive_number, shown
 from enumsol.support.array_arguments import short_vector
-from enumsol.support.files import unreadable
-from enumsol.support.messages import shortened
-from enumsol.support.plotting import checked_units, kept
-from enumsol.support.saved import LARGEST_TOML, toml_from
+from enumsol.support.array_types import Floats, Integers
+from enumsol.support.messages import counted
+from enumsol.support.plotting import checked_units, in_units, kept, new_figure
 
 if TYPE_CHECKING:
     import os
-    from collections.abc import Callable, Mapping, Sequence
-    from pathlib import Path
 
-    from enumsol.fem.conditions import Names, Options, Plane, Vectors
-    from enumsol.fem.meshes import PartedMesh
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+    from enumsol.fem.conditions import Coefficients
     from enumsol.fem.restrained import ContactRows
     from enumsol.model.problem3d import AnyProblem
-    from enumsol.support.array_types import ArrayLike, Floats
+
+
+#: Options that say what a part of the boundary is for.
+_USES = ("contact", "clamp", "symmetry", "displacement", "spring", "load", "load_slope", "pressure", "pressure_slope")
 
 
 @dataclass(frozen=True)
-class Scene(SceneData):
-    """Scene that a mesh and the options of `mesh_problem` describe; ``print(scene)`` says it in words."""
+class Scene:
+    """Scene that a mesh and the options of `mesh_problem` describe; ``print(scene)`` says it in words.
 
-    @classmethod
-    def of(cls, source: PartedMesh | str | os.PathLike[str] | Any, options: Options) -> Scene:
-        """Scene of a mesh, or of what `read_mesh` takes.
+    Attributes
+    ----------
+    mesh : PartedMesh
+    options : Options
+    body : NodalBasis
+    held : Supports
+    contacts : Contacts
+    forces, slope : (N, d) arrays
+        On all nodes, and their derivatives with respect to alpha [force].
+    springs : (d N, d N) csc_array
+    lame : (2,) or (M, 2) array
+    pieces : list of BodyPiece
+        The connected bodies.
+    masses : (M,) array or None
+        Mass per volume, in 2D per area, of the cells; None where it is uniform and not given.
+    notes : list of str
+        What may not have been intended, each in a sentence.
+    """
 
-        Raises
-        ------
-        InvalidArgumentError
-            As `mesh_problem`.
-        """
-        mesh = source if isinstance(source, PartedMesh) else read_mesh(source, options.groups)
-        options = options.with_friction_along_axes(mesh.points.shape[1])
-        if options.plane is None:
-            options = replace(options, plane=_plane(mesh))
-        coefficients = lame_of(mesh, options)
-        thickness = thickness_of(mesh, options.thickness)
-        body = replace(nodal_basis(mesh.points, mesh.cells, labels=mesh.labels), thickness=thickness)
-        held = conditions.Held.of(mesh, options)
-        contacts = contacts_of(body, mesh, options, held)
-        forces = conditions.part_forces(body, mesh, options.load, options.pressure)
-        if options.body_force is not None:
-            forces = forces + body.volume_forces(body_force_of(mesh, options.body_force))
-        slope = conditions.part_forces(body, mesh, options.load_slope, options.pressure_slope, "_slope")
-        springs, pieces = conditions.part_springs(body, mesh, options.spring), conditions.pieces_of(mesh)
-        scene = cls(mesh, options, body, held, contacts, forces, slope, springs, coefficients, pieces)
-        refuse_overlaps(scene)
-        refuse_walls(scene)
-        refuse_pairs(scene)
-        scene.coefficients  # noqa: B018 (refuses those that cannot be used)
-        return scene
+    mesh: PartedMesh
+    options: Options
+    body: NodalBasis
+    held: Supports
+    contacts: Contacts
+    forces: Floats
+    slope: Floats
+    springs: sp.csc_array
+    lame: Floats
+    pieces: list[conditions.BodyPiece]
+    masses: Floats | None = None
+    notes: list[str] = field(default_factory=list)
+
+    @property
+    def dimension(self) -> int:
+        """2 or 3."""
+        return int(self.mesh.points.shape[1])
 
     @cached_property
-    def notes(self) -> list[str]:
-        """Notes on what may not have been intended, each in a sentence."""
-        return scene_notes(self)
+    def gaps(self) -> Floats:
+        """Gaps of the contact nodes, (p,) [length]."""
+        return self.contacts.gaps + of_rows(self.options.gap, "gap", self.contacts.parts, finite_number, 0.0)
+
+    @cached_property
+    def coefficients(self) -> dict[str, Any]:
+        """Coefficients of friction and their slopes, as arguments of the problem."""
+        options = self.options
+        F, slope = self._along("friction", options.friction, options.friction_slope)
+        second = [name for name in FRICTION[2:] if getattr(options, name) is not None]
+        if self.dimension == 2:
+            if second:
+                raise InvalidArgumentError(
+                    f"{second[0]} is given for a plane body, which has one tangent; expected it in 3D"
+                )
+            return {"friction": F, "friction_slope": slope}
+        F2, slope2 = (F, slope)
+        if second:
+            F2, slope2 = self._along("friction2", options.friction2, options.friction2_slope)
+        return {"friction": (F, F2), "friction_slope": (slope, slope2)}
+
+    def _along(self, name: str, friction: Coefficients, friction_slope: Coefficients) -> tuple[Floats, Floats]:
+        """Coefficients along one axis, and their slopes, of all contact nodes."""
+        F, slope = given_friction(friction, friction_slope)
+        other = None if friction is None else 0.0
+        parts = self.contacts.parts
+        return of_rows(F, name, parts, finite_number), of_rows(slope, f"{name}_slope", parts, finite_number, other)
+
+    @property
+    def gaps_of_groups(self) -> list[tuple[Group, Floats]]:
+        """The groups of contact nodes, each with the gaps of its own."""
+        groups = self.contacts.groups
+        return list(zip(groups, np.split(self.gaps, np.cumsum([group.count for group in groups])[:-1]), strict=True))
+
+    @cached_property
+    def hold(self) -> sp.csc_array:
+        """A stiffness of supports and springs, (d N, d N)."""
+        return conditions.holding(self.held, self.springs)
+
+    def uses(self, part: str) -> list[str]:
+        """Uses of a part of the boundary, as the options name it."""
+        found = [name for name in _USES if part in _names(getattr(self.options, name))]
+        pairs = [group.pair for group in self.contacts.groups if group.pair is not None]
+        found += [f"contact nodes of the pair {pair}" for pair in pairs if part == pair.slave]
+        return found + [f"facets of the pair {pair}" for pair in pairs if part == pair.master]
 
     @property
     def sections(self) -> dict[str, list[str]]:
         """Lines that are printed of the scene, by their titles."""
-        return sections_of(self, self.notes)
+        return {
+            "mesh": _mesh(self),
+            "bodies": _bodies(self),
+            "material": _material(self),
+            "parts": _parts(self),
+            "loads": _loads(self),
+            "contact": _contact(self),
+            "note": self.notes,
+        }
+
+    def __str__(self) -> str:
+        return "\n".join(
+            f"{title if k == 0 or title == 'note' else '':10}{line}"
+            for title, lines in self.sections.items()
+            for k, line in enumerate(lines)
+        )
 
     def problem(self) -> AnyProblem:
         """Contact problem of the scene; see `mesh_problem`.
@@ -98,7 +160,7 @@ class Scene(SceneData):
         InvalidArgumentError, InvalidProblemError
             As `mesh_problem`.
         """
-        mesh, contacts, supports = self.mesh, self.contacts, self.held.supports
+        mesh, contacts, supports = self.mesh, self.contacts, self.held
         nodes = contacts.rows
         surface = contacts.facets if any(group.pair is not None for group in contacts.groups) else None
         more: dict[str, Any] = {}
@@ -119,6 +181,7 @@ class Scene(SceneData):
             nodes,
             axes,
             modes=modes,
+            mass=self._mass(),
             mesh=lambda left: BodyMesh.of_dofs(mesh.points, mesh.cells, left, supports.values, surface, lame=self.lame),
             gap=gaps + normal,
             slip_offset=slip_offset,
@@ -129,6 +192,13 @@ class Scene(SceneData):
             **more,
         )
         return afresh(problem, notes=tuple(self.notes))
+
+    def _mass(self) -> sp.csc_array | None:
+        """Consistent mass before supports, (d N, d N), if it is not uniform or was given."""
+        if self.masses is None:
+            return None
+        of_nodes = consistent_mass(self.mesh.points, self.mesh.cells, self.masses)
+        return sp.csc_array(sp.kron(of_nodes, sp.eye_array(self.dimension)))
 
     def _rigid_modes(self) -> tuple[Floats | None, float | None]:
         """Rigid motions that nothing holds, if a bound for them is given, and the bound; None: the default."""
@@ -157,21 +227,7 @@ class Scene(SceneData):
         MissingDependencyError
             matplotlib is not installed.
         """
-        return kept(draw_scene(self, checked_units(units)), file)
-
-    def __str__(self) -> str:
-        return described(self, self.notes)
-
-
-def _plane(mesh: PartedMesh) -> Plane:
-    """Plane of a body where no option says it: strain, unless the file has elements of plane stress."""
-    stressed = [name for name in mesh.types if name.startswith("CPS")]
-    if stressed:
-        raise InvalidArgumentError(
-            f"plane is not given, and the cells are elements of type {stressed[0]}, which are of plane stress; "
-            "expected plane = 'stress', or 'strain' if the type only carries the mesh, as in files of gmsh"
-        )
-    return "strain"
+        return kept(_drawn(self, checked_units(units)), file)
 
 
 def _axes(nodes: ContactRows, axis: object, dimension: int) -> tuple[Floats, ...]:
@@ -187,368 +243,192 @@ def _axes(nodes: ContactRows, axis: object, dimension: int) -> tuple[Floats, ...
     return first, np.cross(nodes.normals, first)
 
 
-T = TypeVar("T")
+def _names(value: str | Iterable[str] | None) -> Sequence[str]:
+    """The parts that an option names."""
+    return [value] if isinstance(value, str) else () if value is None else list(value)
 
 
-def lame_of(mesh: PartedMesh, options: Options) -> Floats:
-    """Lame coefficients of all cells, (2,), or of each where they differ, (M, 2).
+def of_rows(
+    value: object, name: str, parts: Sequence[str], read: Callable[[Any, str], Any], other: object = None
+) -> Floats:
+    """A value of all contact nodes, or (p, ...) by the names of the parts of the boundary that they belong to.
+
+    ``other`` is that of parts that are not named; None: all have to be.
 
     Raises
     ------
     InvalidArgumentError
-        A constant is not admissible, a name does not exist, or a cell has no value or several.
+        It is not that, or a name is none of the parts.
     """
-    plane = options.plane
-    if mesh.points.shape[1] == 3 and plane != "strain":
-        raise InvalidArgumentError(f"plane is {plane!r} of a body in 3D; expected it for plane meshes only")
-    values: list[Any] = [
-        _of_cells(mesh, options.young, "young", positive_number),
-        _of_cells(mesh, options.poisson, "poisson", finite_number),
-        _of_cells(mesh, plane, "plane", lambda value, name: one_of(value, name, ("strain", "stress"))),
+    if not isinstance(value, Mapping):
+        return np.array(read(value, name))
+    given = {part: read(own, f"{name} of {part}") for part, own in conditions.by_part(value, name).items()}
+    present = list(dict.fromkeys(parts))
+    for part in given:
+        if part not in present:
+            raise InvalidArgumentError(
+                f"{name} is given for {part}, which has no contact nodes; expected some of {', '.join(present)}"
+            )
+    missing = [part for part in present if part not in given]
+    if missing and other is None:
+        raise InvalidArgumentError(f"{name} is not given for {', '.join(missing)}; expected it for all contact parts")
+    return np.array([given.get(part, other) for part in parts])
+
+
+#: Components of a resultant below this part of all nodal forces are rounding.
+_ROUNDING = 1e-12
+
+
+def _mesh(scene: Scene) -> list[str]:
+    mesh, d = scene.mesh, scene.dimension
+    cells = [f"{len(rows)} {KINDS[d, nodes.shape[1]].name}" for rows, nodes in by_kind(d, mesh.cells)]
+    extent = f"from {_vector(mesh.points.min(axis=0))} to {_vector(mesh.points.max(axis=0))}"
+    return [f"{len(mesh.points)} nodes, {', '.join(cells)}, {extent}"]
+
+
+def _bodies(scene: Scene) -> list[str]:
+    mesh = scene.mesh
+    sizes = np.empty(len(mesh.cells))
+    for block in scene.body.blocks:
+        sizes[block.rows] = np.sum(block.basis.dx, axis=1)
+
+    def size(rows: Integers) -> str:
+        what = "area" if scene.dimension == 2 else "volume"
+        return f"{counted(len(rows), 'cell')}, {what} {np.sum(sizes[rows]):.6g}"
+
+    lines, said = [], set()
+    for piece in scene.pieces:
+        free = piece.free_motions(mesh.points, scene.hold)
+        modes = f"{counted(free, 'rigid mode')} that nothing but contact holds" if free else "held"
+        lines.append(f"{piece.name}: {size(np.flatnonzero(np.all(piece.nodes[mesh.cells], axis=1)))}, {modes}")
+        said.add(piece.name)
+    return [*lines, *(f"part {name}: {size(rows)}" for name, rows in mesh.bodies.items() if name not in said)]
+
+
+def _material(scene: Scene) -> list[str]:
+    given = () if scene.options.density is None else ("density",)
+    names = ("young", "poisson", *(("plane", "thickness") if scene.dimension == 2 else ()), *given)
+    return [f"{name} {_said(getattr(scene.options, name))}" for name in names]
+
+
+def _parts(scene: Scene) -> list[str]:
+    plain, what = replace(scene.body, thickness=None), "length" if scene.dimension == 2 else "area"
+    lines = []
+    for name, facets in scene.mesh.facets.items():
+        try:
+            size = f"{what} {np.sum(plain.on_part(facets, name, lambda v, _: v[0], lumped=True)):.6g}"
+        except InvalidArgumentError:
+            size = "not on the boundary"
+        lines.append(f"{name}: {counted(len(facets), 'facet')}, {size}; {', '.join(scene.uses(name)) or 'not used'}")
+    lines += [
+        f"{name}: {counted(len(nodes), 'node')}; {', '.join(scene.uses(name)) or 'not used'}"
+        for name, nodes in scene.mesh.node_sets.items()
+        if name not in scene.mesh.facets
     ]
-    if not any(isinstance(value, list) for value in values):
-        return np.asarray(lame(*values))
-    count = len(mesh.cells)
-    each = list(zip(*(value if isinstance(value, list) else [value] * count for value in values), strict=True))
-    known = {constants: lame(*constants) for constants in dict.fromkeys(each)}
-    return np.array([known[constants] for constants in each])
+    return lines
 
 
-def thickness_of(mesh: PartedMesh, value: object) -> Floats | None:
-    """Thickness of every cell of a plane body, (M,); None for one [length].
-
-    Raises
-    ------
-    InvalidArgumentError
-        As `lame_of`, or the body is not plane.
-    """
-    given = _of_cells(mesh, value, "thickness", positive_number)
-    if given == 1:
-        return None
-    if mesh.points.shape[1] == 3:
-        raise InvalidArgumentError("thickness is given for a body in 3D; expected it for plane meshes only")
-    return np.broadcast_to(np.array(given, dtype=np.float64), len(mesh.cells))
+def _loads(scene: Scene) -> list[str]:
+    lines = [f"resultant {_resultant(scene.forces)}"]
+    if np.any(scene.slope):
+        lines.append(f"times alpha: resultant {_resultant(scene.slope)}")
+    return lines
 
 
-def body_force_of(mesh: PartedMesh, value: object) -> Floats:
-    """Force per volume of every cell, (M, d); parts of the body without one have none [force / length^3].
-
-    Raises
-    ------
-    InvalidArgumentError
-        It is not that, or a name does not exist.
-    """
-    dimension = mesh.points.shape[1]
-    if not isinstance(value, Mapping):
-        return np.tile(short_vector(value, "body_force", dimension), (len(mesh.cells), 1))
-    density = np.zeros((len(mesh.cells), dimension))
-    for part, force in conditions.by_part(value, "body_force").items():
-        density[mesh.body(part)] += short_vector(force, f"body_force of {part}", dimension)
-    return density
+def _resultant(forces: Floats) -> str:
+    """The sum of nodal forces, without what rounding leaves of those that cancel."""
+    total = forces.sum(axis=0)
+    return _vector(np.where(np.abs(total) <= _ROUNDING * np.sum(np.abs(forces)), 0.0, total))
 
 
-def _of_cells(mesh: PartedMesh, value: object, name: str, read: Callable[[Any, str], T]) -> T | list[T]:
-    """A value of all cells, or a list of one for each if it is given by names of parts of the body."""
-    if not isinstance(value, Mapping):
-        return read(value, name)
-    found: list[T | None] = [None] * len(mesh.cells)
-    of_part: dict[int, str] = {}
-    for part, given in conditions.by_part(value, name).items():
-        own = read(given, f"{name} of {part}")
-        for row in mesh.body(part).tolist():
-            if found[row] is not None and found[row] != own:
-                raise InvalidArgumentError(
-                    f"{name} is given for {of_part[row]} and for {part}, which share cells; expected one value"
-                )
-            found[row], of_part[row] = own, part
-    each = [own for own in found if own is not None]
-    if len(each) < len(found):
-        first = found.index(None)
-        others = [part for part, rows in mesh.bodies.items() if first in rows]
-        raise InvalidArgumentError(
-            f"{name} is not given for {len(found) - len(each)} of {len(found)} cells"
-            f"{f', those of {others[0]}' if others else ', which belong to no named part'}; expected it for all"
-        )
-    return each
+def _contact(scene: Scene) -> list[str]:
+    lines = []
+    for group, gaps in scene.gaps_of_groups:
+        gap = f"gap {gaps[0]:.6g}" if np.ptp(gaps) == 0 else f"gaps from {gaps.min():.6g} to {gaps.max():.6g}"
+        lines.append(f"{counted(group.count, 'contact node')} of {group}, {gap}")
+    coefficients = {name: getattr(scene.options, name) for name in FRICTION}
+    return [*lines, *(f"{name} {_said(value)}" for name, value in coefficients.items() if value is not None)]
 
 
-#: What ``pairs`` may be called in TOML files.
-_PAIRS = "contact_pair"
+def _said(value: float | str | Mapping[str, float | str]) -> str:
+    """A number, a word, or one of these for each of several parts."""
+    if isinstance(value, Mapping):
+        return ", ".join(f"{_said(own)} ({part})" for part, own in value.items())
+    return value if isinstance(value, str) else f"{float(value):.6g}"
 
 
-def mesh_problem(
-    mesh: PartedMesh | str | os.PathLike[str] | Any,
-    *,
-    young: float | Mapping[str, float],
-    poisson: float | Mapping[str, float],
-    contact: Names = (),
-    pairs: Sequence[Sequence[Any]] = (),
-    plane: Plane | Mapping[str, Plane] | None = None,
-    thickness: float | Mapping[str, float] = 1.0,
-    friction: float | Mapping[str, float] | None = None,
-    friction_slope: float | Mapping[str, float] | None = None,
-    friction2: float | Mapping[str, float] | None = None,
-    friction2_slope: float | Mapping[str, float] | None = None,
-    axis: ArrayLike | None = None,
-    clamp: Names = (),
-    symmetry: Names = (),
-    displacement: Mapping[str, Sequence[Any]] | None = None,
-    spring: Vectors = None,
-    load: Vectors = None,
-    load_slope: Vectors = None,
-    pressure: Mapping[str, float] | None = None,
-    pressure_slope: Mapping[str, float] | None = None,
-    body_force: ArrayLike | Mapping[str, ArrayLike] | None = None,
-    gap: float | Mapping[str, float] = 0.0,
-    obstacle: Mapping[str, Sequence[float]] | None = None,
-    max_rigid_displacement: float | Literal["auto"] | None = None,
-    groups: str | None = None,
-) -> AnyProblem:
-    """Contact problem of a body whose mesh has named parts.
-
-    `mesh_scene` describes in words and in a picture what the arguments stand for.
-
-    Contact is by nodes: every node of the contact parts that is not held has a row, including, in second order, the
-    nodes between corners. On triangles with six nodes, the facets of tetrahedra of second order, only the nodes between
-    corners have rows, since a uniform pressure has no part at the corners. Rows are displacements of nodes, not
-    weighted, and lambda are the nodal forces that do the work on them. In 2D rows are in the order of the nodes along
-    the boundary.
-
-    Normals are those of the boundary, averaged around each node with its shape function as weight, or those of the
-    obstacle. At nodes on a plane of symmetry they are projected on it; the component across it stays in the problem,
-    uncoupled and at rest.
-
-    Parameters
-    ----------
-    mesh : PartedMesh, path, or meshio.Mesh
-        What `read_mesh` returns or takes. Parts are called by their names.
-    young, poisson : float, or mapping of names to float
-        Young's modulus [force / length^2] and Poisson's ratio [-], of the whole body or of every part of it
-        (``mesh.bodies``).
-    contact : name or names
-        The contact boundary, in contact with a rigid foundation.
-    pairs : sequence of (slave, master) or (slave, master, gap)
-        Parts of two bodies that may touch each other. The nodes of the first part are the contact nodes; each is in
-        contact with the point of a facet of the second part on the line along its normal (theory, section 11.8). Nodes
-        that face no facet have no contact. The gap is the distance along the normal, or the one that is given [length].
-    plane : {"strain", "stress"}, or mapping of names to them, optional
-        In 2D, whether strain or stress is plane, for the whole body or for every part of it; by default strain. It has
-        to be given for a file whose elements are of plane stress (CPS4 and the like).
-    thickness : float, or mapping of names to float
-        In 2D, of the whole body or of every part of it; all forces and stiffnesses are multiplied by it. By default
-        they are per unit thickness [length].
-    friction, friction_slope : float, in 3D also (float, float), or mapping of names to these, optional
-        Coefficient friction + alpha friction_slope [-], of all contact nodes or of every contact part and of the first
-        part of every pair (the slope is 0 for parts that are not named); in 3D a pair is along both axes. A node of two
-        parts has the coefficient of the one that `contact` names first. Without both the coefficient is alpha; without
-        one of them that one is 0.
-    friction2, friction2_slope : float, or mapping of names to float, optional
-        In 3D, coefficient along the second axis, in place of pairs; without both as along the first.
-    axis : (3,) array_like, optional
-        In 3D, direction whose projection on the tangent plane is the first axis; default as `solid_contact_problem`.
-    clamp : name or names
-        Parts that are held in all components.
-    symmetry : name or names
-        Parts in planes perpendicular to an axis, held in the direction of that axis: planes of symmetry, rollers.
-    displacement : mapping of names to components
-        Given displacements in x, y (and z), each a number [length], or ``"free"`` or None where it is not given.
-    spring : mapping of names to (kn, kt)
-        Springs to the ground along the normal and across it, per area (in 2D per length) [force / length^3].
-    load, load_slope : mapping of names to vectors
-        Force per area (in 2D per length) in x, y (and z), and its derivative with respect to alpha [force / length^2].
-    pressure, pressure_slope : mapping of names to float
-        Force per area along the inward normal, and its derivative with respect to alpha [force / length^2].
-    body_force : vector, or mapping of names to vectors, optional
-        Force per volume, such as the weight, on the whole body or on parts of it [force / length^3].
-    gap : float, or mapping of names to float
-        Initial gap along the normals, for all contact nodes or, like friction, by parts (0 for parts that are not
-        named), in addition to the distance to the obstacle or within a pair; a negative gap is a press fit [length].
-    obstacle : mapping of one kind to numbers, optional
-        The rigid foundation of the contact parts, where it does not have the shape of the body: ``{"plane": (x, y, nx,
-        ny)}`` by a point and the direction from it to the body, ``{"circle": (x, y, r)}``, or ``{"hole": (x, y, r)}``,
-        a circle that the body is inside of; in 3D ``plane`` with six numbers, ``sphere`` and ``hole`` with four.
-    max_rigid_displacement : float, "auto" or None
-        Lets bodies that supports and springs leave free move as a whole: their rigid modes are found, and solutions are
-        sought within this bound of the rigid displacement, ten times the size of the mesh for "auto" (theory, section
-        14) [length]. By default such a body is refused.
-    groups : str, optional
-        As in `read_mesh`.
-
-    Returns
-    -------
-    ContactProblem or ContactProblem3D
-        With ``coordinates``, ``mesh`` and, as ``node_ids``, the numbers of the nodes in the mesh; in 3D also with
-        ``areas``. Its ``notes``, a tuple of sentences, say what may not have been intended: nodes of a pair that face
-        nothing, for example, have no contact.
-
-    Raises
-    ------
-    InvalidArgumentError
-        The mesh cannot be used, a part does not exist (those that do are listed), or an argument is not of the stated
-        form.
-    InvalidProblemError
-        Nothing but contact holds the body or a part of it, or the data of the problem are not admissible.
-
-    Examples
-    --------
-    >>> from enumsol import fem
-    >>> mesh = fem.rectangle(4, 2).parted()
-    >>> problem = fem.mesh_problem(
-    ...     mesh, young=2.5, poisson=0.25, clamp="left", contact="bottom", load={"top": (0.3, -1)}, friction=0.5
-    ... )
-    >>> problem.n, problem.p
-    (24, 4)
-    """
-    given = Options(
-        young=young, poisson=poisson, contact=contact, pairs=pairs, plane=plane, thickness=thickness,
-        friction=friction, friction_slope=friction_slope, friction2=friction2, friction2_slope=friction2_slope,
-        axis=axis, clamp=clamp, symmetry=symmetry, displacement=displacement, spring=spring,
-        load=load, load_slope=load_slope, pressure=pressure, pressure_slope=pressure_slope, body_force=body_force,
-        gap=gap, obstacle=obstacle, max_rigid_displacement=max_rigid_displacement, groups=groups,
-    )  # fmt: skip
-    return Scene.of(mesh, given).problem()
+def _vector(values: Floats) -> str:
+    return f"({', '.join(f'{float(value) + 0.0:.6g}' for value in values)})"
 
 
-def mesh_scene(mesh: PartedMesh | str | os.PathLike[str] | Any, **options: Any) -> Scene:
-    """Scene that a mesh and options of `mesh_problem` describe: ``print(scene)``, ``scene.plot()``, ``scene.notes``.
-
-    The scene lists the bodies, the parts with their areas, the resultant of the loads, the contact nodes with their
-    gaps, which bodies are free to move, and what may not have been intended. ``scene.problem()`` is what `mesh_problem`
-    returns.
-
-    Parameters
-    ----------
-    mesh, **options
-        As in `mesh_problem`.
-
-    Returns
-    -------
-    Scene
-
-    Raises
-    ------
-    InvalidArgumentError
-        As in `mesh_problem`, or there is an option that it does not have.
-
-    Examples
-    --------
-    >>> from enumsol import fem
-    >>> scene = fem.mesh_scene(
-    ...     fem.rectangle(4, 2).parted(), young=2.5, poisson=0.25, contact="bottom", clamp="left", friction=0.5
-    ... )
-    >>> print(scene)
-    mesh      15 nodes, 16 triangles, from (0, 0) to (1, 1)
-    bodies    the body: 16 cells, area 1, held
-    ...
-    contact   4 contact nodes of bottom, gap 0
-    ...
-    """
-    check_keys(options)
-    known = inspect.signature(mesh_problem).parameters.items()
-    return Scene.of(mesh, Options(**{name: options.get(name, of.default) for name, of in known if name != "mesh"}))
+#: Length of the longest force, and of a normal, as a part of the extent.
+_FORCE, _NORMAL = 0.16, 0.06
+_BODY, _EDGE, _LOAD, _SLOPE, _CONTACT = "#dfe6ee", "#aab6c3", "#b3202c", "#d9730d", "#1f5fa8"
 
 
-def read_mesh_problem(path: str | os.PathLike[str]) -> AnyProblem:
-    r"""Contact problem that a TOML file describes: the options of `mesh_problem`, with ``mesh`` a path from its folder.
+def _drawn(scene: Scene, units: tuple[str, str] | None = None) -> Figure:
+    """A figure of a `Scene`."""
+    from matplotlib.collections import LineCollection, PolyCollection  # with the first figure
+    from mpl_toolkits.mplot3d.art3d import Poly3DCollection
 
-    In the file, ``pairs`` may also be called ``contact_pair``.
-
-    The file may also have a ``title`` and ``units`` of forces and lengths such as "N,mm", for what commands print,
-    and the ``steps`` of a history, which the command ``enumsol history`` reads.
-
-    Parameters
-    ----------
-    path : str or path-like
-
-    Raises
-    ------
-    InvalidProblemError
-        The file cannot be read, is not TOML, lacks a key or has one that is not known, or describes no problem. The
-        message begins with the path.
-    MissingDependencyError
-        meshio is not installed.
-
-    Examples
-    --------
-    >>> import meshio, pathlib
-    >>> from enumsol import fem
-    >>> cells = [("quad", [[0, 1, 2, 3]]), ("line", [[0, 1], [2, 3]])]
-    >>> meshio.Mesh([[0, 0], [1, 0], [1, 1], [0, 1]], cells, cell_data={"part": [[0], [1, 2]]}).write("square.vtu")
-    >>> text = "mesh = 'square.vtu'\ngroups = 'part'\nyoung = 2.5\npoisson = 0.25\nclamp = '2'\ncontact = '1'"
-    >>> _ = pathlib.Path("square.toml").write_text(text)
-    >>> fem.read_mesh_problem("square.toml").p
-    2
-    """
-    return _of_file(path, lambda scene: scene.problem())
-
-
-def read_mesh_scene(path: str | os.PathLike[str]) -> Scene:
-    """Scene that a TOML file describes, see `mesh_scene`.
-
-    Parameters
-    ----------
-    path : str or path-like
-
-    Raises
-    ------
-    InvalidProblemError, MissingDependencyError
-        As `read_mesh_problem`, except that what does not make a problem may still be a scene.
-    """
-    return _of_file(path, lambda scene: scene)
+    mesh, d = scene.mesh, scene.dimension
+    figure: Figure = new_figure(figsize=(8.0, 5.6))
+    ax: Any = figure.add_subplot(**({"projection": "3d"} if d == 3 else {}))
+    if d == 2:
+        for _, cells in by_kind(2, mesh.cells):
+            outlines = mesh.points[cells[:, KINDS[2, cells.shape[1]].outline]]
+            ax.add_collection(PolyCollection(list(outlines), facecolor=_BODY, edgecolor=_EDGE, linewidth=0.5))
+    else:
+        faces = mesh.points[facet_outlines(boundary_facets(3, mesh.cells))]
+        ax.add_collection3d(Poly3DCollection(list(faces), facecolor=_BODY, edgecolor=_EDGE, linewidth=0.3, alpha=0.25))
+    for k, (name, facets) in enumerate(mesh.facets.items()):
+        label = f"{name}: {', '.join(scene.uses(name)) or 'not used'}"
+        if d == 2:
+            along = facets if facets.shape[1] == 2 else facets[:, [0, 2, 1]]
+            ax.add_collection(LineCollection(list(mesh.points[along]), color=f"C{k}", linewidth=3, label=label))
+        else:
+            sides = list(mesh.points[facet_outlines(facets)])
+            ax.add_collection3d(Poly3DCollection(sides, facecolor=f"C{k}", alpha=0.35, label=label))
+    places = mesh.points[scene.contacts.rows.nodes]
+    extent = float(np.max(np.ptp(mesh.points, axis=0)))
+    ax.plot(*places.T, "o", color=_CONTACT, markersize=4, label="contact nodes and their normals", zorder=5)
+    _arrows(ax, places, _NORMAL * extent * scene.contacts.rows.normals, _CONTACT)
+    for forces, colour, label in ((scene.forces, _LOAD, "loads"), (scene.slope, _SLOPE, "loads times alpha")):
+        shown = signs(mesh.points, acting_nodes(forces), _edges(d, mesh.cells))
+        if shown:
+            sums = np.array([forces[group].sum(axis=0) for _, group in shown])
+            long = _FORCE * extent / np.max(np.linalg.norm(sums, axis=1)) * sums
+            some = ", summed over nodes side by side" if any(len(group) > 1 for _, group in shown) else ""
+            _arrows(ax, mesh.points[[node for node, _ in shown]] - long, long, colour, label + some)
+    if d == 2:
+        ax.autoscale_view()
+        ax.set_aspect("equal", adjustable="datalim")
+        ax.margins(0.1)
+    else:
+        ax.auto_scale_xyz(*mesh.points.T)
+        ax.set_aspect("equal")
+    for direction in "xyz"[: d if units is not None else 0]:
+        getattr(ax, f"set_{direction}label")(in_units(direction, "length", units))
+    figure.legend(loc="outside right upper", fontsize=7)
+    return figure
 
 
-def _of_file(path: object, made: Callable[[Scene], T]) -> T:
-    place = file_path(path, "path")
-    try:
-        options = _toml(place)
-        name = file_path(options.pop("mesh", None), "mesh", "the name of a mesh file in quotes")
-        options.pop("steps", None)  # of enumsol history
-        checked_units(options.pop("units", None))
-        text_of(options.pop("title", ""), "title")
-        check_keys(options, also=(_PAIRS,))
-        written = "{0}.{1} = {2}".format, "{0} = {2}".format
-        source = refuse_old_friction(place.parent / name, options, lambda *said: written[not said[1]](*said))
-        return made(mesh_scene(source, **options))
-    except (InvalidArgumentError, InvalidProblemError) as error:
-        raise InvalidProblemError(f"{place}: {error}") from error
+def _edges(dimension: int, cells: Integers) -> Integers:
+    """Edges of the boundary between neighbouring nodes, (k, 2)."""
+    facets = boundary_facets(dimension, cells)
+    if dimension == 3:
+        outlines = facet_outlines(facets)
+        return np.stack([outlines, np.roll(outlines, -1, axis=1)], axis=2).reshape(-1, 2)
+    along = facets if facets.shape[1] == 2 else facets[:, [0, 2, 1]]
+    return np.concatenate([along[:, k : k + 2] for k in range(along.shape[1] - 1)])
 
 
-def _toml(place: Path) -> dict[str, Any]:
-    if (found := unreadable(place)) is not None:
-        raise InvalidArgumentError(f"{found}; expected a TOML file of options")
-    with place.open("rb") as file:
-        content = file.read(LARGEST_TOML + 1)
-    try:
-        options = toml_from(content)
-    except ValueError as error:
-        reason = shortened(str(error))
-        raise InvalidArgumentError(
-            f"it is not a TOML file ({reason}); expected lines such as contact = 'floor'"
-        ) from error
-    if {_PAIRS, "pairs"} <= options.keys():
-        raise InvalidArgumentError(f"{_PAIRS} and pairs are given; expected only one of them")
-    return {"pairs" if name == _PAIRS else name: value for name, value in options.items()}
-
-
-def check_keys(options: Mapping[str, Any], spelled: Callable[[str], str] = str, also: tuple[str, ...] = ()) -> None:
-    """Refuse options that `mesh_problem` does not have, and the lack of those that it must have.
-
-    ``spelled`` gives the name of an option as its user writes it, and ``also`` has names that may be meant as well.
-
-    Raises
-    ------
-    InvalidArgumentError
-        The closest name is given, or what is missing.
-    """
-    known = {name: p.default for name, p in inspect.signature(mesh_problem).parameters.items() if name != "mesh"}
-    for name in options:
-        if name not in known:
-            close = difflib.get_close_matches(name, [*known, *also], n=1)
-            hint = f"did you mean {close[0]}?" if close else f"expected some of mesh, {', '.join(known)}"
-            raise InvalidArgumentError(f"there is no option {shown(name)}; {hint}")
-    missing = [name for name, default in known.items() if default is inspect.Parameter.empty and name not in options]
-    if not {"contact", "pairs"} & options.keys():
-        missing.append("contact")
-    if missing:
-        names = ", ".join(map(spelled, missing))
-        raise InvalidArgumentError(f"{names} {'is' if len(missing) == 1 else 'are'} missing")
+def _arrows(ax: Axes, places: Floats, vectors: Floats, colour: str, label: str | None = None) -> None:
+    if places.shape[1] == 2:
+        ax.quiver(
+            *(*places.T, *vectors.T), color=colour, label=label, angles="xy", scale_units="xy", scale=1.0, width=0.004,
+            zorder=4,
+        )  # fmt: skip
+        ax.update_datalim(np.concatenate([places, places + vectors]))
+    else:
+        ax.quiver(*places.T, *vectors.T, color=colour, label=label, arrow_length_ratio=0.25)

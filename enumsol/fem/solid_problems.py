@@ -33,7 +33,6 @@ if TYPE_CHECKING:
 
 #: How far axes may be from right angles and length one, for rounding.
 AXES_TOLERANCE = 1e-10
-_GAUSS_2 = (0.5 - np.sqrt(1 / 12), 0.5 + np.sqrt(1 / 12)), (0.5, 0.5)
 _GAUSS_3 = (0.5 - np.sqrt(0.15), 0.5, 0.5 + np.sqrt(0.15)), (5 / 18, 8 / 18, 5 / 18)
 
 
@@ -88,28 +87,12 @@ def _tetrahedron_volumes(corners: Floats) -> Floats:
 
 def _corner_volumes(corners: Floats) -> Floats:
     """Volumes (M, 8) of the parallelepipeds that the three edges at each corner of a hexahedron span."""
-    return np.stack([_jacobians(corners, corner)[1] for corner in HEXAHEDRON], axis=1)
-
-
-def _jacobians(corners: Floats, place: Floats) -> tuple[Floats, Floats]:
-    """Shape functions (8,) of the hexahedron at a place of the reference, and the determinants (M,) there."""
-    factors = np.where(HEXAHEDRON == 1, place, 1.0 - place)
-    slopes = np.where(HEXAHEDRON == 1, 1.0, -1.0)
-    gradients = np.stack([slopes[:, k] * np.prod(np.delete(factors, k, axis=1), axis=1) for k in range(3)])
-    return np.prod(factors, axis=1), np.asarray(np.linalg.det(np.einsum("ka,mai->mki", gradients, corners)))
-
-
-def shape_volumes(nodes: Floats, cells: Integers) -> Floats:
-    """Integral of every corner's shape function over its cell, (M, 4) or (M, 8) [length^3]."""
-    corners = nodes[cells]
-    if cells.shape[1] == 4:
-        return np.tile(_tetrahedron_volumes(corners)[:, None] / 4.0, (1, 4))
-    points, weights = _GAUSS_2
-    total = np.zeros(cells.shape)
-    for i, j, k in np.ndindex(2, 2, 2):
-        values, determinants = _jacobians(corners, np.array([points[i], points[j], points[k]]))
-        total += weights[i] * weights[j] * weights[k] * determinants[:, None] * values
-    return total
+    found, slopes = [], np.where(HEXAHEDRON == 1, 1.0, -1.0)
+    for corner in HEXAHEDRON:
+        factors = np.where(HEXAHEDRON == 1, corner, 1.0 - corner)
+        gradients = np.stack([slopes[:, k] * np.prod(np.delete(factors, k, axis=1), axis=1) for k in range(3)])
+        found.append(np.linalg.det(np.einsum("ka,mai->mki", gradients, corners)))
+    return np.stack(found, axis=1)
 
 
 def outward(facets: Integers, cells: Integers) -> Integers:
@@ -450,7 +433,7 @@ def solid_body_forces(points: ArrayLike, cells: ArrayLike, density: ArrayLike) -
     """
     nodes, bodies = solid_mesh(points, cells)
     values = meshes.vectors_of_all(density, "density", (len(bodies), 3))
-    return restrained.gathered(bodies, shape_volumes(nodes, bodies), values, len(nodes))
+    return nodal_basis(nodes, bodies).volume_forces(values)
 
 
 def facet_forces(points: ArrayLike, facets: ArrayLike, traction: ArrayLike) -> Floats:

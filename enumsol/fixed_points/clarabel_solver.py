@@ -20,9 +20,6 @@ if TYPE_CHECKING:
     from enumsol.fixed_points.system import Problem
     from enumsol.support.array_types import Floats
 
-#: Tolerance of Clarabel; Newton's method improves the result.
-TOLERANCE = 1e-11
-
 
 def interior_point(data: TrescaData) -> tuple[Floats | None, Floats]:
     """The x that solves a Tresca problem to about 1e-9, from scratch, None if Clarabel fails; and a rigid displacement.
@@ -69,7 +66,7 @@ def interior_point(data: TrescaData) -> tuple[Floats | None, Floats]:
         ],
         system.S.size,
         direct_solve_method="faer",  # the Hessian is dense, for which the default is several times slower
-        **dict.fromkeys(tolerances, TOLERANCE),
+        **dict.fromkeys(tolerances, 1e-11),
     )
     found, rigid = np.array(answer.x), -np.array(answer.z)[: system.modes]
     if not (np.all(np.isfinite(found)) and np.all(np.isfinite(rigid))):

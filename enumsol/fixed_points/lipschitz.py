@@ -21,8 +21,6 @@ if TYPE_CHECKING:
     from enumsol.support.array_types import Alpha, AlphaLike, ArrayLike, Floats
 
 
-#: Slips per node at which a friction function is sampled for its largest values and slopes.
-_SAMPLES = 257
 #: Smallest ratio of two areas.
 _LEAST_SHARE = 1e-100
 
@@ -234,7 +232,7 @@ def _coefficients(system: ContactSystem, reach: Floats, lipschitz: float | None)
     if isinstance(body.law, FrictionTable):
         slips = np.tile(body.law.slip, (body.p, 1)).T
     else:
-        slips = np.linspace(0.0, 1.0, _SAMPLES if body.depends_on_solution else 2)[:, None] * reach
+        slips = np.linspace(0.0, 1.0, 257 if body.depends_on_solution else 2)[:, None] * reach
     F = np.array([body.coefficients(system.alpha, slip) for slip in slips])
     most, least = np.max(F, axis=0), np.min(F, axis=0)
     ratio = float(np.max(np.max(F, axis=2) / np.maximum(np.min(F, axis=2), 1e-300)))

@@ -29,8 +29,8 @@ _FORMAT = 1
 _ARRAYS = ("slip_bound", "coefficients", "lambda_n", "lambda_t", "u_n", "u_t", "slip", "increments")
 #: What a body that nothing holds has beside them; the second is empty where it is None.
 _RIGID_ARRAYS = ("rigid_coordinates", "free_motion")
-#: Nodes that a printed result shows, columns of its text, and what is noise beside the largest number of a kind.
-_PRINTED, _WIDTH, _NOISE = 32, 80, 1e-12
+#: Nodes that a printed result shows.
+_PRINTED = 32
 
 
 def _names(body: Problem) -> tuple[str, ...]:
@@ -288,7 +288,7 @@ class FixedPoint(TrescaState):
             shown.append("slip_bound")
         for prefix in ("lambda", "u_"):  # rounding beside what is there is printed as the zero that it stands for
             group = [name for name in names if name.startswith(prefix)]
-            noise = _NOISE * float(np.max(np.abs(frame[group].to_numpy()), initial=0.0))
+            noise = 1e-12 * float(np.max(np.abs(frame[group].to_numpy()), initial=0.0))
             frame[group] = frame[group].where(frame[group].abs() > noise, 0.0)
             shown += group
         text = frame[shown].head(_PRINTED).to_string(index=False, float_format=lambda value: f"{value:.5g}")
@@ -299,4 +299,4 @@ class FixedPoint(TrescaState):
 
 
 def _wrapped(text: str, indent: str) -> list[str]:
-    return textwrap.wrap(text, _WIDTH, initial_indent=indent, subsequent_indent="    ", break_long_words=False)
+    return textwrap.wrap(text, 80, initial_indent=indent, subsequent_indent="    ", break_long_words=False)

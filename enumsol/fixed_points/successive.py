@@ -21,7 +21,7 @@ from enumsol.fixed_points.tresca_newton import TrescaData, TrescaNotFeasible, Tr
 from enumsol.model.problem3d import ContactProblem3D, warn_of_jumps
 from enumsol.support.arguments import optional_callable, positive_integer, positive_number
 from enumsol.support.array_arguments import real_array
-from enumsol.support.keeping import keeping
+from enumsol.support.deadlines import keeping
 from enumsol.support.messages import counted
 
 if TYPE_CHECKING:
@@ -29,12 +29,6 @@ if TYPE_CHECKING:
 
     from enumsol.fixed_points.system import Problem
     from enumsol.support.array_types import AlphaLike, Floats
-
-
-#: Differences of residuals that depend on each other to this degree are dropped.
-_RANK_TOLERANCE = 1e-10
-#: A residual this many times the smallest so far drops the history.
-_WORSE = 10.0
 
 
 class AndersonMixing:
@@ -55,7 +49,7 @@ class AndersonMixing:
         """The next iterate after x with Psi(x) = image; its entries are not negative."""
         residual = image - x
         size = float(np.linalg.norm(residual))
-        if size > _WORSE * self._least:
+        if size > 10.0 * self._least:
             self._residuals.clear()
             self._images.clear()
         self._least = min(self._least, size)
@@ -64,25 +58,13 @@ class AndersonMixing:
         if len(self._residuals) < 2:
             return image
         steps = np.diff(np.array(self._residuals), axis=0).T
-        gamma = np.linalg.lstsq(steps, residual, rcond=_RANK_TOLERANCE)[0]
+        # differences of residuals that depend on each other to this degree are dropped
+        gamma = np.linalg.lstsq(steps, residual, rcond=1e-10)[0]
         return np.maximum(image - np.diff(np.array(self._images), axis=0).T @ gamma, 0.0)
 
 
-#: Corrections of g for the rounding of S (theory, section 11.7) after which it is given up; one or two are enough where
-#: S is not almost singular.
-MOST_CORRECTIONS = 5
-#: A contraction factor nearer to 1 than this part, and one that is not known, counts as 1 minus it.
-_SLOWEST = 1e-3
-#: Ratios of increments that the contraction factor is taken from.
-_RATIOS = 5
-#: Increments no larger than this part are rounding if none of that many following ones is smaller.
-_SMALL, _PATIENCE = 1e-6, 20
-#: Longest cycle that is detected; two iterates are the same if they are this much closer than neighbours.
-LONGEST_CYCLE, _SAME = 12, 1e-9
-#: A scaled slip bound that no force reaches.
-_UNBOUNDED = 1e100
-#: Most iterates that Anderson's mixing keeps.
-MOST_DEPTH = 1000
+#: Small increments are rounding if none of so many following ones is smaller.
+_PATIENCE = 20
 
 
 @dataclass(frozen=True)
@@ -107,7 +89,7 @@ class FixedPointProgress:
 def successive_approximations(
     problem: Problem,
     alpha: AlphaLike,
-    start: Any = None,
+    start: object = None,
     tolerance: float = 1e-10,
     max_iterations: int = 1000,
     anderson: int = 0,
@@ -176,7 +158,7 @@ def successive_approximations(
     body = checked_problem(problem)
     tolerance = positive_number(tolerance, "tolerance")
     limit = positive_integer(max_iterations, "max_iterations")
-    depth = positive_integer(anderson, "anderson", least=0, most=MOST_DEPTH)
+    depth = positive_integer(anderson, "anderson", least=0, most=1000)
     optional_callable(progress, "progress")
     system = ContactSystem.at(body, alpha)
     return _Iteration(system, tolerance, depth, progress).run(start, limit)
@@ -198,7 +180,7 @@ class _Iteration:
         # sqrt(work) of the scaled system: the product of the force and the length factor is the same at every node
         self.work = float(np.sqrt(system.force[0] * system.length[0]))
         self.depth, self.mixing = depth, AndersonMixing(depth)
-        self.recent: deque[Floats] = deque(maxlen=LONGEST_CYCLE + 1)
+        self.recent: deque[Floats] = deque(maxlen=13)  # cycles of up to 12
         self.increments: list[tuple[float, float]] = []
         self.sizes: list[float] = []
         self.largest_slip = 0.0
@@ -206,7 +188,7 @@ class _Iteration:
         self.motion: Floats | None = None
         self.started = time.perf_counter()
 
-    def run(self, start: Any, limit: int) -> FixedPoint:
+    def run(self, start: object, limit: int) -> FixedPoint:
         system = self.system
         self.bound, self.slip = self._start(start)
         self.data = TrescaData(system, self.bound, system.coefficients(self.slip))
@@ -219,16 +201,18 @@ class _Iteration:
             lambda found: f" after {counted(found.iterations, 'iteration')}",
         )
 
-    def _iterated(self, start: Any, limit: int) -> FixedPoint:
+    def _iterated(self, start: object, limit: int) -> FixedPoint:
         system = self.system
         outcome, period = Outcome.ROUNDING, None
         try:
             if start is None and system.modes:
                 outcome = Outcome.NOT_HELD
-                self.x, _, _ = solve_scaled(replace(self.data, bound=np.full(system.p, _UNBOUNDED)), self.x)
+                unbounded = np.full(system.p, 1e100)  # no force reaches it
+                self.x, _, _ = solve_scaled(replace(self.data, bound=unbounded), self.x)
                 self.bound, self.slip = self._image()
                 outcome = Outcome.ROUNDING
-            for _ in range(MOST_CORRECTIONS + 1):
+            # one or two corrections for the rounding of S are enough unless it is almost singular
+            for _ in range(6):
                 ended, period = self._iterate(limit)
                 better = self._rounding(ended)
                 settled = ended is Outcome.CONVERGED and self.rounding <= self.tolerance
@@ -273,7 +257,7 @@ class _Iteration:
             self.rounding = max(self.rounding, *self.sizes[-_PATIENCE:])
         return better
 
-    def _start(self, start: Any) -> tuple[Floats, Floats]:
+    def _start(self, start: object) -> tuple[Floats, Floats]:
         """Scaled slip bounds and slips to begin with."""
         system, p = self.system, self.system.p
         slip: Any = 0.0
@@ -320,17 +304,18 @@ class _Iteration:
     def _reach(self, moved: float) -> float:
         """Distance from the limit for an increment, by the contraction seen in the last ones (theory, (11.11))."""
         self.sizes.append(moved)
-        recent = self.sizes[-_RATIOS - 1 :]
+        recent = self.sizes[-6:]
         if self.depth or not recent[0]:  # mixed iterates do not shrink as those of Psi do
             return moved
         ratio = (moved / recent[0]) ** (1.0 / (len(recent) - 1)) if len(recent) > 1 else 1.0
-        q = min(ratio, 1.0 - _SLOWEST)
+        # a factor nearer to 1, and one that is not known
+        q = min(ratio, 1.0 - 1e-3)
         return moved * max(1.0, q / (1.0 - q))
 
     def _stalled(self) -> bool:
         """True if increments are small and shrink no more: rounding."""
         last, before = self.sizes[-_PATIENCE:], self.sizes[:-_PATIENCE]
-        return bool(before) and min(before) <= min(_SMALL, *last)
+        return bool(before) and min(before) <= min(1e-6, *last)
 
     def _look_for_jumps(self, slip: Floats) -> None:
         body = self.system.problem
@@ -347,7 +332,7 @@ class _Iteration:
         if len(earlier) < 2:
             return None
         distances = np.linalg.norm(np.array(earlier) - image, axis=1)
-        same = np.flatnonzero(distances[1:] <= _SAME * distances[0])
+        same = np.flatnonzero(distances[1:] <= 1e-9 * distances[0])
         return int(same[0]) + 2 if len(same) else None
 
     def _next(self, bound: Floats, slip: Floats, image: Floats, image_slip: Floats) -> tuple[Floats, Floats]:
@@ -375,7 +360,7 @@ class _Iteration:
         )
 
 
-def fixed_point_residual(problem: Problem, root: Any) -> float:
+def fixed_point_residual(problem: Problem, root: object) -> float:
     """Distance by which Psi moves a root, relative to the load [-].
 
     The largest change of a contact force when the Tresca problem with the root's normal forces as slip bounds, and
@@ -407,7 +392,7 @@ def fixed_point_residual(problem: Problem, root: Any) -> float:
     return float(np.max(np.abs(image - x)[: system.m]))
 
 
-def is_fixed_point(problem: Problem, root: Any, tolerance: float = 1e-8) -> bool:
+def is_fixed_point(problem: Problem, root: object, tolerance: float = 1e-8) -> bool:
     """True if a root is a fixed point of Psi within a tolerance (theory, section 11.3).
 
     With coefficients that do not depend on the solution the fixed points are exactly the solutions with Coulomb

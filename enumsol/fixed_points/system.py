@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 from scipy.linalg import block_diag, cho_solve, solve_triangular
@@ -32,8 +32,6 @@ if TYPE_CHECKING:
 
     Problem = ContactProblem | ContactProblem3D
 
-#: Forces of a body that nothing holds that are so many times the load are taken for none.
-_MOST_FORCE = 1e6
 #: Most that coefficients may be, and given forces and slips, in units in which those of the load have size 1.
 _LARGEST = 1e100
 
@@ -164,7 +162,8 @@ class ContactSystem:
         Of a body that nothing holds there is no such bound; forces so large are taken for none (theory, section 14.10).
         """
         if self.modes:
-            return np.full(self.m, _MOST_FORCE)
+            # larger forces are taken for none
+            return np.full(self.m, 1e6)
         inverse = solve_triangular(self.cholesky, np.eye(len(self.S)), lower=True, check_finite=False)
         return np.asarray(self.load_energy * np.linalg.norm(inverse, axis=0))
 
@@ -259,13 +258,13 @@ class ContactSystem:
         return np.concatenate([normal, tangential.T.ravel(), rigid])
 
 
-def driven(problem: Any, alpha: Alpha, slip_bound: Floats, coefficients: Floats, motion: Floats) -> str:
+def driven(problem: Problem, alpha: Alpha, slip_bound: Floats, coefficients: Floats, motion: Floats) -> str:
     """In words: how the load drives the body along a rigid displacement, and how friction resists at given bounds."""
-    moved = problem.rigid_modes @ motion
+    moved = problem.modes.N @ motion
     slips = (problem.contact_rows @ moved)[problem.p :].reshape(-1, problem.p).T
     work = float(problem.load_at(alpha) @ moved)
     against = float(slip_bound @ np.linalg.norm(coefficients * slips, axis=1))
     return (
-        f"along {modes_of(problem.rigid_modes, motion)} the load drives it with {work:.4g}, and friction within these "
+        f"along {modes_of(problem.modes.N, motion)} the load drives it with {work:.4g}, and friction within these "
         f"bounds resists with at most {against:.4g}"
     )

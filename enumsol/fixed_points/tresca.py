@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from functools import cached_property
 from types import MappingProxyType
-from typing import TYPE_CHECKING, Any, Literal, Self
+from typing import TYPE_CHECKING, Any, Literal, Self, get_args
 
 import numpy as np
 
@@ -193,7 +193,6 @@ class TrescaState(Sealed):
 
 
 Solver = Literal["newton", "clarabel", "cvxpy"]
-SOLVERS = ("newton", "clarabel", "cvxpy")
 #: Residual of a solution by an interior-point method that is good enough where Newton's method does not improve it.
 _INTERIOR_POINT_ACCEPTED = 1e-7
 
@@ -233,7 +232,7 @@ def solve_tresca(
     alpha: AlphaLike,
     *,
     slip: ArrayLike | None = None,
-    start: Any = None,
+    start: object = None,
     solver: Solver = "newton",
 ) -> TrescaSolution:
     """The one solution of the contact problem with friction of Tresca's type (theory, sections 11.2 and 14.10).
@@ -281,7 +280,7 @@ def solve_tresca(
     TrescaSolution at alpha = 3 on 1 contact node: sum of lambda_n 1, residual ..., by newton
     """
     body = checked_problem(problem)
-    one_of(solver, "solver", SOLVERS)
+    one_of(solver, "solver", get_args(Solver))
     system = ContactSystem.at(body, alpha)
     bound = system.scaled(node_values(slip_bound, "slip_bound", body.p), system.force, "slip_bound")
     slips = node_values(0.0 if slip is None else slip, "slip", body.p)

@@ -14,23 +14,14 @@ from enumsol.errors import EnumsolError
 from enumsol.fixed_points.system import ContactSystem, driven
 from enumsol.support.array_types import Floats, Mask
 
-#: Steps after which the method stops; from a near start it needs two to five.
-MOST_STEPS = 30
 #: The residual below which a point counts as the solution [unit of the scaled system, in which solutions have size 1],
 #: and the one below which the method stops.
 ACCEPTED, ROUNDING = 1e-11, 1e-15
-#: Steps of the proximal point method, and its weights in a system whose S has a diagonal near 1.
-MOST_PROXIMAL, _FIRST_RHO, _LEAST_RHO = 60, 1e-3, 1e-14
-#: Tangential forces that cannot get larger than this [as above] are none: far below rounding, far above underflow.
-_NEGLIGIBLE = 1e-100
 #: Where normals and sticking forces resist a rigid displacement less, relative to all forces, they do not at all.
 _FREE = 1e-10
 #: Forces, displacements, slip bounds and what is left of these [as above] that count as zero where it is asked how a
 #: body may move on: above what is left of forces at an accepted point (``ACCEPTED``).
 _TIGHT = 1e-8
-#: A load that is in balance but for less than this is; slip bounds above the second number [as above] are seldom
-#: reached; and directions that are this close to a plane may be meant to be in it.
-_BALANCED, _LARGE, _NEARLY = 1e-10, 1e3, (0.1, 1e-3, 0.0)
 
 
 class TrescaNotSolved(EnumsolError, ArithmeticError):  # noqa: N818 (reads as what happened)
@@ -74,7 +65,8 @@ class TrescaData:
     def occurs(self) -> Mask:
         """Which tau occur, shape (p, d)."""
         with np.errstate(over="ignore"):
-            return np.asarray(self.F * self.bound[:, None] > _NEGLIGIBLE)
+            # far below rounding, far above underflow
+            return np.asarray(self.F * self.bound[:, None] > 1e-100)
 
     def steps(self) -> tuple[Floats, Floats]:
         """Factors r of (11.3), by node: for normals and for tangents, each (p,)."""
@@ -105,7 +97,8 @@ class TrescaData:
         x = system.joined(normal, np.where(self.occurs, tangential, 0.0), start[system.m :])
         w = system.moves(x)
         best, least, stalled = x, self._residual(x, w), 0
-        for _ in range(MOST_STEPS):
+        # from a near start it needs two to five
+        for _ in range(30):
             if least <= ROUNDING or (least <= ACCEPTED and stalled):
                 break
             try:
@@ -130,8 +123,8 @@ class TrescaData:
         """
         system, m = self.system, self.system.m
         best, least = start, self.residual(start)
-        x, rho = best, _FIRST_RHO
-        for _ in range(MOST_PROXIMAL):
+        x, rho = best, 1e-3  # the diagonal of S is near 1
+        for _ in range(60):
             if least <= ACCEPTED:
                 break
             S, g, h = system.S + rho * np.eye(m), system.g + rho * x[:m], system.h + rho * x[m:]
@@ -140,7 +133,7 @@ class TrescaData:
             if inner > ACCEPTED:
                 rho *= 8.0
                 continue
-            x, rho = found, max(0.125 * rho, _LEAST_RHO)
+            x, rho = found, max(0.125 * rho, 1e-14)
             residual = self.residual(x)
             if residual < least:
                 best, least = x, residual
@@ -191,16 +184,17 @@ class TrescaData:
         most = np.minimum(self.bound, system.largest_forces[: system.p])
         spans = np.concatenate([np.ones((system.p, 1)), self.F * most[:, None]], axis=1).T.ravel() * system.G
         size = np.linalg.norm(spans, axis=0)
-        large = np.concatenate([np.ones(system.p, dtype=bool), np.tile(most >= _LARGE, system.tangents)]) & (size > 0)
+        large = np.concatenate([np.ones(system.p, dtype=bool), np.tile(most >= 1e3, system.tangents)]) & (size > 0)
         spans = spans[:, large] / size[large]
         z = motion / (np.linalg.norm(motion) or 1.0)
-        for nearly in _NEARLY:
+        # how close to a plane directions may be that are meant to be in it
+        for nearly in (0.1, 1e-3, 0.0):
             tight = spans[:, np.abs(spans.T @ z) <= nearly]
             candidate = z - tight @ (np.linalg.pinv(tight) @ z)
             along_n, along_t = system.split(system.G.T @ candidate)
             work, against = float(system.h @ candidate), float(most @ np.linalg.norm(self.F * along_t, axis=1))
             lifted = float(np.sum(np.maximum(along_n, 0.0))) * float(system.largest_forces[0])
-            if work - against > max(lifted, _BALANCED * system.load_energy):
+            if work - against > max(lifted, 1e-10 * system.load_energy):
                 return np.asarray(candidate)
         return None
 
@@ -261,14 +255,10 @@ class TrescaData:
 
         node_n = np.flatnonzero(active)
         node_s, axis_s = np.nonzero(self.occurs & ~sliding[:, None])
-        node_a = np.flatnonzero(sliding & np.all(self.occurs, axis=1)) if d == 2 else np.empty(0, dtype=np.intp)
+        node_a = np.flatnonzero(sliding & np.all(self.occurs, axis=1) & (d == 2))
         delta = self.bound[node_a] / size[node_a]
         root = np.sqrt(delta)
-        across = (
-            root[:, None] * self.F[node_a] * np.stack([-along[node_a, -1], along[node_a, 0]], axis=1)
-            if d == 2
-            else np.empty((0, 2))
-        )
+        across = root[:, None] * self.F[node_a] * np.stack([-along[node_a, -1], along[node_a, 0]], axis=1)
         counts = np.cumsum([0, len(node_n), len(node_s), len(node_a)])
         columns = [np.arange(counts[k], counts[k + 1]) for k in range(3)]
         Q = sp.csc_array(

@@ -24,8 +24,6 @@ if TYPE_CHECKING:
 
 Pair = tuple[float, float]
 Problem = TypeVar("Problem", bound=ContactBody)
-#: Largest number of triangles in a chain.
-_MOST_TRIANGLES = 1_000_000
 
 
 def one_node_triangle(f: Pair = (1.5, -4.0), lame: Pair = (1.0, 1.0)) -> ContactProblem:
@@ -450,7 +448,7 @@ def chain(p: int, coupling: float = 0.0, f: Pair = (1.5, -4.0), lame: Pair = (1.
     >>> len(enumsol.enumerate_roots(enumsol.gallery.chain(3), alpha=5)) == 3**3
     True
     """
-    count = positive_integer(p, "p", most=_MOST_TRIANGLES)
+    count = positive_integer(p, "p", most=1_000_000)
     spring = nonnegative_number(coupling, "coupling")
     # the graph Laplacian of the row: a spring pulls on both of its ends
     link = np.arange(count - 1)

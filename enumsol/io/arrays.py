@@ -62,27 +62,18 @@ class Layout:
 
 
 _SYNONYMS = {
-    "a": "A",
-    "k": "A",
-    "stiffness": "A",
-    "bn": "Bn",
-    "n": "Bn",
-    "normal": "Bn",
-    "f": "f",
-    "b": "f",
-    "rhs": "f",
-    "load": "f",
-    "force": "f",
-    "forces": "f",
-    "g": "gap",
-    "gap0": "gap",
-    "mu": "friction",
-    "dload": "load_slope",
-    "m": "mass",
-    "nodes": "node_ids",
-    "labels": "node_ids",
-    "points": "coordinates",
-    "coords": "coordinates",
+    other: name
+    for name, others in (
+        ("A", "a k stiffness"),
+        ("Bn", "bn n normal"),
+        ("f", "f b rhs load force forces"),
+        ("gap", "g gap0"),
+        ("friction", "mu"),
+        ("load_slope", "dload"),
+        ("node_ids", "nodes labels"),
+        ("coordinates", "points coords"),
+    )
+    for other in others.split()
 }
 _COMMON = ("gap", "friction", "load_slope", "slip_offset", "node_ids", "coordinates", "mass")
 #: Names of the arrays of a BodyMesh: one of "mesh_motion" and "mesh_dofs" is required, and all of MESH.

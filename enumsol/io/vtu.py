@@ -30,9 +30,8 @@ if TYPE_CHECKING:
     from enumsol.support.array_types import Floats, Integers
 
 
-_PLANE_STATUS = {status.value: float(code) for code, status in enumerate(STATUSES)}
-_STATUS = {"open": 0.0, "stick": 1.0}
-_SLIPS = 2.0
+#: Numbers of statuses in files, in 2D those of their codes.
+_STATUS = {status.value: float(code) for code, status in enumerate(STATUSES)} | {"slip": 2.0}
 #: Directions of contact rows are known if they are orthonormal to this.
 _ORTHONORMAL = 1e-8
 
@@ -149,7 +148,16 @@ def _empty(states: Sequence[SolvedState]) -> str:
 
 
 def _picture(meshio: ModuleType, problem: AnyProblem, state: SolvedState) -> Any:
-    return _plane(meshio, problem, state) if isinstance(problem, ContactProblem) else _space(meshio, problem, state)
+    data = _row_data(problem, state)
+    if problem.mesh is None:
+        if problem.coordinates is None:
+            raise InvalidArgumentError("problem has neither mesh nor coordinates; expected one of them for a picture")
+        vertices = np.arange(problem.p)[:, None]
+        return meshio.Mesh(_in_space(problem.coordinates), [("vertex", vertices)], point_data=data)
+    u = _array(state, "u", (problem.n,))
+    if isinstance(problem, ContactProblem):
+        return _plane(meshio, problem, u, data)
+    return _body(meshio, problem, problem.mesh, u, data | _vectors(problem, data))
 
 
 def _collection(names: list[str]) -> bytes:
@@ -173,31 +181,9 @@ def _stresses(problem: AnyProblem, u: Floats) -> dict[str, Floats]:
     return {"stress": np.pad(stress, ((0, 0), (0, 1), (0, 1))).reshape(-1, 9)}
 
 
-def _space(meshio: ModuleType, problem: ContactProblem3D, state: SolvedState) -> Any:
-    data = _row_data(problem, state)
-    if problem.mesh is None:
-        if problem.coordinates is None:
-            raise InvalidArgumentError("problem has neither mesh nor coordinates; expected one of them for a picture")
-        vertices = np.arange(problem.p)[:, None]
-        return meshio.Mesh(problem.coordinates, [("vertex", vertices)], point_data=data)
-    data |= _vectors(problem, data)
-    u = _array(state, "u", (problem.n,))
-    return _body(meshio, problem, problem.mesh, u, data)
-
-
-def _plane(meshio: ModuleType, problem: ContactProblem, state: SolvedState) -> Any:
-    p = problem.p
-    data = {name: _array(state, name, (p,)) for name in ("lambda_n", "lambda_t", "u_n", "u_t")}
-    statuses = getattr(state, "statuses", None)
-    if statuses is not None:
-        data["status"] = np.array([_PLANE_STATUS[str(status)] for status in statuses])
-    if problem.mesh is None:
-        if problem.coordinates is None:
-            raise InvalidArgumentError("problem has neither mesh nor coordinates; expected one of them for a picture")
-        return meshio.Mesh(_in_space(problem.coordinates), [("vertex", np.arange(p)[:, None])], point_data=data)
+def _plane(meshio: ModuleType, problem: ContactProblem, u: Floats, data: dict[str, Floats]) -> Any:
     shape = body_shape(problem)
     nodes, count = np.asarray(shape.weights.argmax(axis=1)).ravel(), len(shape.points)
-    u = _array(state, "u", (problem.n,))
     moves = shape.displacements(u)
     forces = shape.contact_forces(problem, data["lambda_n"], data["lambda_t"])
     point_data = {"displacement": _in_space(moves), "contact_force": _in_space(forces)}
@@ -209,7 +195,7 @@ def _plane(meshio: ModuleType, problem: ContactProblem, state: SolvedState) -> A
 
 
 def _in_space(vectors: Floats) -> Floats:
-    return np.concatenate([vectors, np.zeros((len(vectors), 1))], axis=1)
+    return np.pad(vectors, ((0, 0), (0, 3 - vectors.shape[1])))
 
 
 def _array(state: SolvedState, name: str, shape: tuple[int, ...]) -> Floats:
@@ -223,18 +209,21 @@ def _array(state: SolvedState, name: str, shape: tuple[int, ...]) -> Floats:
     return array
 
 
-def _row_data(problem: ContactProblem3D, state: SolvedState) -> dict[str, Floats]:
+def _row_data(problem: AnyProblem, state: SolvedState) -> dict[str, Floats]:
     """Scalars of the contact rows, each (p,)."""
     p = problem.p
-    normal, tangential = _array(state, "lambda_n", (p,)), _array(state, "lambda_t", (p, 2))
-    u_t = _array(state, "u_t", (p, 2))
-    data = {"lambda_n": normal, "lambda_t1": tangential[:, 0], "lambda_t2": tangential[:, 1]}
-    data |= {"u_n": _array(state, "u_n", (p,)), "u_t1": u_t[:, 0], "u_t2": u_t[:, 1]}
-    if problem.areas is not None:
-        data["pressure"] = normal / problem.areas
+    data: dict[str, Floats] = {}
+    for kind in ("lambda", "u"):
+        data[f"{kind}_n"] = _array(state, f"{kind}_n", (p,))
+        if isinstance(problem, ContactProblem):
+            data[f"{kind}_t"] = _array(state, f"{kind}_t", (p,))
+        else:
+            data[f"{kind}_t1"], data[f"{kind}_t2"] = _array(state, f"{kind}_t", (p, 2)).T
+    if isinstance(problem, ContactProblem3D) and problem.areas is not None:
+        data["pressure"] = data["lambda_n"] / problem.areas
     statuses = getattr(state, "statuses", None)
     if statuses is not None:
-        data["status"] = np.array([_STATUS.get(str(status), _SLIPS) for status in statuses])
+        data["status"] = np.array([_STATUS[str(status)] for status in statuses])
     return data
 
 

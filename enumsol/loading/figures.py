@@ -16,6 +16,9 @@ from enumsol.support.plotting import axes_of, figure_of, in_units, line_entry
 if TYPE_CHECKING:
     from collections.abc import Callable
 
+    from matplotlib.axes import Axes
+    from matplotlib.text import Annotation
+
     from enumsol.roots.root import Root
 
 
@@ -29,17 +32,17 @@ LABELS = {
     "dissipated": "work of friction since the start",
 }
 _DIMENSIONS = {"displacement": "length", "lambda_n": "force", "lambda_t": "force", "dissipated": "work"}
-#: Histories that have a colour of their own; ends that are labelled.
-_COLOURED, _NAMED = 10, 24
+#: Histories that have a colour of their own.
+_COLOURED = 10
 #: Where a name may stand beside the end of a history, in points, best first; points on a line that it should not hide.
 _BESIDE = [(side * 6, up) for far in (4, 14, 24, 34, 44) for side in (1, -1) for up in (far, -far - 6)]
 _ALONG = np.linspace(0.0, 1.0, 16)
 _SHARED = "#555555"
 
 
-def draw_history(data: HistoryData, x: Any, y: Any, ax: Any, units: tuple[str, str] | None = None) -> Any:
+def draw_history(data: HistoryData, x: object, y: object, place: object, units: tuple[str, str] | None = None) -> Any:
     """A figure; see History.plot."""
-    ax = axes_of(ax, (8.4, 4.6))
+    ax = axes_of(place, (8.4, 4.6))
     across, up = _values(data, x, "x"), _values(data, y, "y")
     colours = _colours(data)
     for before, node in data.graph.edges:
@@ -93,7 +96,7 @@ def _ways(data: HistoryData) -> dict[Node, int]:
     return ways
 
 
-def _legend(data: HistoryData, colours: dict[tuple[Node, Node], str], ax: Any) -> None:
+def _legend(data: HistoryData, colours: dict[tuple[Node, Node], str], ax: Axes) -> None:
     """Beside the drawing: where every history with a colour of its own goes, and what else there is to be seen."""
     handles = []
     for number, path in enumerate(data.paths() if _ways(data)[START] <= _COLOURED else ()):
@@ -113,11 +116,11 @@ def _legend(data: HistoryData, colours: dict[tuple[Node, Node], str], ax: Any) -
     if any(node[0] < len(data.steps) and node not in data.followed for node, _ in nodes):
         handles.append(line_entry("not followed", marker="o", markerfacecolor="white", **point))
     if handles:
-        where = {"loc": "upper left", "bbox_to_anchor": (1.01, 1.0)}
-        ax.legend(handles=handles, title="histories", fontsize=8, title_fontsize=8, frameon=False, **where)
+        look: dict[str, Any] = {"title": "histories", "fontsize": 8, "title_fontsize": 8, "frameon": False}
+        ax.legend(handles=handles, loc="upper left", bbox_to_anchor=(1.01, 1.0), **look)
 
 
-def _name_ends(data: HistoryData, across: dict[Node, float], up: dict[Node, float], ax: Any) -> None:
+def _name_ends(data: HistoryData, across: dict[Node, float], up: dict[Node, float], ax: Axes) -> None:
     """Names beside the ends of histories, where they hide no other and few lines; ends at one place have one label."""
     places: dict[tuple[int, int], list[Node]] = {}
     spans = [max(values.values()) - min(values.values()) or 1.0 for values in (across, up)]
@@ -133,13 +136,13 @@ def _name_ends(data: HistoryData, across: dict[Node, float], up: dict[Node, floa
     ]
     lines = ax.transData.transform(np.concatenate(drawn)) if drawn else np.empty((0, 2))
     names: list[Any] = []
-    for nodes in list(places.values())[:_NAMED]:
+    for nodes in list(places.values())[:24]:
         text = ", ".join(f"{step}.{number}" for step, number in nodes[:4]) + (", ..." if len(nodes) > 4 else "")
         label = ax.annotate(
             text, (across[nodes[0]], up[nodes[0]]), xytext=(0, 0), textcoords="offset points", fontsize=8
         )
 
-        def cost(offset: tuple[int, int], label: Any = label) -> tuple[int, int]:
+        def cost(offset: tuple[int, int], label: Annotation = label) -> tuple[int, int]:
             label.set(ha="left" if offset[0] > 0 else "right", position=offset)
             box = label.get_window_extent()
             outside = box.x0 < ax.bbox.x0 or box.x1 > ax.bbox.x1 or box.y0 < ax.bbox.y0 or box.y1 > ax.bbox.y1

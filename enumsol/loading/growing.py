@@ -35,17 +35,18 @@ from enumsol.roots.enumerate import enumerate_roots
 from enumsol.roots.root import Root
 from enumsol.search.outcome import Stop, StopReason
 from enumsol.support import arguments
-from enumsol.support.keeping import keeping
+from enumsol.support.deadlines import keeping
 from enumsol.support.messages import counted
 from enumsol.support.workers import workers_of
 
 if TYPE_CHECKING:
     from concurrent.futures import Executor
 
-    from enumsol.loading.history_data import HistoryData, Node
+    from enumsol.loading.history_data import Node
     from enumsol.model.problem3d import AnyProblem
     from enumsol.roots.root_set import RootSet
-    from enumsol.support.keeping import Ending
+    from enumsol.support.array_types import Alpha
+    from enumsol.support.deadlines import Ending
 
     #: Of a parent's root (None in the first step) and the roots of the next step, those that are followed.
     Choice = Callable[[Root | None, RootSet], Any]
@@ -369,7 +370,8 @@ class _Growing:
             self.parents[len(self.stages) :] = [tuple(item.parents)]
             self.node_of[stage.number] = nodes
             self.stages.append(stage)
-            self.reasons += [f"step {number}{self._whence(item)}: {reason}" for reason in stage.reasons]
+            whence = f" from root {', '.join(map(named, item.parents))}" if item.parents else ""
+            self.reasons += [f"step {number}{whence}: {reason}" for reason in stage.reasons]
             if number < len(self.steps):
                 self._ends(stage, item, nodes, following)
             if self.progress is not None:
@@ -383,10 +385,6 @@ class _Growing:
             following = following[:most]
         self.followed.update(node for item in following for node in item.parents)
         return following
-
-    @staticmethod
-    def _whence(item: _Waiting) -> str:
-        return "" if not item.parents else " from root " + ", ".join(named(node) for node in item.parents)
 
     def _stage(self, number: int, step: LoadStep, item: _Waiting) -> Stage:
         problem = restarted(self._base(step), item.start)
@@ -403,7 +401,7 @@ class _Growing:
             self.bases[key] = restarted(self.problem, start, step.load, step.friction)
         return self.bases[key]
 
-    def _open(self, problem: object, alpha: object, roots: RootSet, item: _Waiting) -> tuple[str, ...]:
+    def _open(self, problem: AnyProblem, alpha: Alpha, roots: RootSet, item: _Waiting) -> tuple[str, ...]:
         """Why a stage is not complete, in words."""
         reasons = []
         if roots.families:
@@ -415,7 +413,7 @@ class _Growing:
             reasons.append(self._undecided(problem, alpha, roots, item))
         return tuple(reasons)
 
-    def _undecided(self, problem: Any, alpha: Any, roots: RootSet, item: _Waiting) -> str:
+    def _undecided(self, problem: AnyProblem, alpha: Alpha, roots: RootSet, item: _Waiting) -> str:
         first = roots.undecided[0]
         text = f"{counted(len(roots.undecided), 'part')} undecided ({first.reason})"
         if item.start.radius is None or self.search["arithmetic"] != "verified":

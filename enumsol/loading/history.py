@@ -30,13 +30,13 @@ from enumsol.support.plotting import checked_units, kept
 from enumsol.support.saved import Array, Maybe, check_kind, is_fraction, is_number, json_from
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Mapping
+    from collections.abc import Iterable, Iterator, Mapping, Sequence
     from pathlib import Path
 
     import pandas as pd
 
     from enumsol.model.problem3d import AnyProblem
-    from enumsol.support.array_types import Floats
+    from enumsol.support.array_types import Alpha, Floats
 
 FORMAT, VERSION = "enumsol-history", 3
 _ARRAYS = ("lambda_n", "lambda_t", "u_n", "u_t")
@@ -98,7 +98,7 @@ def load_history(file: str | Path, problem: AnyProblem) -> history_data.HistoryD
         )
 
 
-def _kind(problem: AnyProblem, steps: Any) -> dict[str, Any]:
+def _kind(problem: AnyProblem, steps: Sequence[object]) -> dict[str, Any]:
     """Kinds of what a file holds."""
     p, shape, modes = problem.p, problem.slip_offset.shape, problem.modes.r
     known = {status.value for status in ContactStatus}
@@ -124,14 +124,16 @@ def _kind(problem: AnyProblem, steps: Any) -> dict[str, Any]:
     refinement = {"halvings": int, "settled": bool, "changed_at": [int], "reason": Maybe(str)}
     return {
         "arithmetic": {"verified", "exact", "fast"},
-        "steps": [{"alpha": Maybe(is_fraction), "friction": Maybe(_is_list), "load": Maybe(Array(problem.n))}],
+        "steps": [
+            {
+                "alpha": Maybe(is_fraction),
+                "friction": Maybe(lambda value: isinstance(value, list)),
+                "load": Maybe(Array(problem.n)),
+            }
+        ],
         **{"stages": [stage], "parents": [[node]], "followed": [node], "reasons": [str]},
         **{"seconds": is_number, "refinement": Maybe(refinement)},
     }
-
-
-def _is_list(value: object) -> bool:
-    return isinstance(value, list)
 
 
 def _check_nodes(record: dict[str, Any]) -> None:
@@ -207,7 +209,7 @@ def _read_stage(
     return history_data.Stage(number, record["step"], start, roots, body, tuple(record["reasons"]))
 
 
-def _read_bound(record: dict[str, Any], body: Any) -> RigidBound | None:
+def _read_bound(record: dict[str, Any], body: AnyProblem) -> RigidBound | None:
     needed = record["bound_needed"]
     return None if needed is None else RigidBound(body.rigid_reach, needed, record["beyond_limit"])
 
@@ -226,7 +228,7 @@ def _root(root: Root) -> dict[str, Any]:
     }
 
 
-def _read_root(record: dict[str, Any], alpha: Any, problem: AnyProblem) -> Root:
+def _read_root(record: dict[str, Any], alpha: Alpha, problem: AnyProblem) -> Root:
     bounds, slips, angles = (record[name] for name in ("bounds", "slips", "angles"))
     arrays: dict[str, Any] = {name: np.array(record[name], dtype=np.float64) for name in _ARRAYS}
     return Root(
@@ -264,7 +266,7 @@ def _array(values: object) -> Floats | None:
     return None if values is None else np.array(values, dtype=np.float64)
 
 
-def _read_family(record: dict[str, Any], alpha: Any) -> RootFamily:
+def _read_family(record: dict[str, Any], alpha: Alpha) -> RootFamily:
     parts = tuple(
         Polytope(_statuses(names), np.array(vertices), dimension, _array(rigid))
         for names, vertices, dimension, rigid in record["polytopes"]
@@ -272,7 +274,7 @@ def _read_family(record: dict[str, Any], alpha: Any) -> RootFamily:
     return RootFamily(alpha, parts, record["index"], vertices_proven=record["proven"])
 
 
-def _names(statuses: Any) -> list[Any]:
+def _names(statuses: Iterable[ContactStatus | str | None]) -> list[str | None]:
     return [status.value if isinstance(status, ContactStatus) else status for status in statuses]
 
 

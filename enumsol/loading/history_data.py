@@ -37,11 +37,6 @@ if TYPE_CHECKING:
     from enumsol.support.array_types import Floats
 
 
-#: A start is stated with a larger radius than was found, so that a checker on another processor, whose rounding is
-#: different, finds its own ball inside: by this share, and by this many times what rounding has left in the first step.
-_WIDER, _ROUNDINGS = 2.0**-5, 2.0
-
-
 @dataclass(frozen=True, eq=False)
 class Stage:
     """The roots of one step from one start.
@@ -80,11 +75,15 @@ class Rounding:
     first: float = 0.0
 
     def widened(self, found: Ball, before: SlipStart) -> SlipStart:
-        """A ball as a start, stated wider (see above); what was carried over unchanged stays as it was."""
+        """A ball as a start; what was carried over unchanged stays as it was.
+
+        It is stated with a larger radius than was found, so that a checker on another processor, whose rounding is
+        different, finds its own ball inside: by a share, and by twice what rounding has left in the first step.
+        """
         kept = (found.mid == before.ball.mid) & (found.rad == before.ball.rad)
         if before.radius is None:
             self.first = max(self.first, float(np.max(found.rad, initial=0.0)))
-        more = found.rad * _WIDER + _ROUNDINGS * np.minimum(self.first, found.rad)
+        more = 2.0**-5 * found.rad + 2.0 * np.minimum(self.first, found.rad)
         more += 8 * UNIT * np.abs(found.mid)
         radius = np.where(kept, found.rad, (found.rad + more) * SAFE)
         offset, radius = (values.reshape(before.offset.shape, order="F") for values in (found.mid, radius))
@@ -393,8 +392,8 @@ def _following(data: HistoryData) -> list[list[int]]:
     return [sorted(numbers) for numbers in found]
 
 
-#: Lines of the tree, steps of the table and reasons that are printed at most.
-_TREE, _STEPS, _REASONS = 40, 40, 8
+#: Lines of the tree and steps of the table that are printed at most, and reasons.
+_LINES, _REASONS = 40, 8
 #: How the line of a node below a branching begins, and the lines below it; of the last one otherwise.
 _BRANCH = {True: ("└─ ", "   "), False: ("├─ ", "│  ")}
 _HEADS = ("step", "alpha", "roots", "from", "histories", "dissipated")
@@ -406,7 +405,7 @@ def history_text(history: HistoryData, units: tuple[str, str] | None = None) -> 
     rows = [heads, *body]
     widths = (4, 10, 6, 5, 10, max(11, len(heads[-1])))
     table = [" ".join(f"{cell:>{width}}" for cell, width in zip(row, widths, strict=True)) for row in rows]
-    left = len(history.steps) - _STEPS
+    left = len(history.steps) - _LINES
     more = [f"   ... {counted(left, 'more step')}"] if left > 0 else []
     return "\n".join([_heading(history), *table, *more, "tree", *tree_lines(history), *_notes(history)])
 
@@ -424,7 +423,7 @@ def steps_table(
     return (*_HEADS[:-1], in_units(_HEADS[-1], "work", units)), _rows(history)
 
 
-def tree_lines(history: HistoryData, most: int = _TREE) -> Iterator[str]:
+def tree_lines(history: HistoryData, most: int = _LINES) -> Iterator[str]:
     """The tree, a line per node: only below a branching it is indented.
 
     What follows a node that several lead to stands below the first of them.
@@ -461,7 +460,7 @@ def _heading(history: HistoryData) -> str:
 
 def _rows(history: HistoryData) -> list[tuple[str, ...]]:
     rows: list[tuple[str, ...]] = []
-    for number in range(1, min(len(history.steps), _STEPS) + 1):
+    for number in range(1, min(len(history.steps), _LINES) + 1):
         nodes = history.nodes_of(number)
         work = [history.dissipated[node] for node in nodes]
         span = "" if not work else _span(min(low for low, _ in work), max(high for _, high in work))

@@ -19,8 +19,8 @@ from enumsol.model.problem import ContactProblem
 from enumsol.search.outcome import Stop, StopReason
 from enumsol.support import arguments
 from enumsol.support.array_arguments import vector_of
+from enumsol.support.deadlines import keeping
 from enumsol.support.immutable import Immutable, Listed
-from enumsol.support.keeping import keeping
 from enumsol.support.messages import counted
 from enumsol.support.plotting import area_entry, axes_of, checked_units, figure_of, in_units, kept, line_entry
 from enumsol.support.workers import spread, workers_of
@@ -482,14 +482,14 @@ def map_row(
 
 #: Colours of one solution, two, and so on; the last one is for more.
 _COLOURS = ("#ffffff", "#c9b7dd", "#f2b56b", "#d97b5a", "#c04d6b", "#8a3b82", "#5b3b96", "#333a80", "#1c2c58")
-_UNIQUE, _PALE, _FOLD = "#2a8a4a", 0.45, "#222222"
+_UNIQUE, _FOLD = "#2a8a4a", "#222222"
 
 
-def draw_map(name: str, rows: Sequence[MapRow], curves: Sequence[Any], title: str, ax: Any) -> Any:
+def draw_map(name: str, rows: Sequence[MapRow], curves: Sequence[Any], title: str, place: object) -> Any:
     """A figure; see MultiplicityMap.plot."""
     from matplotlib.patches import Rectangle
 
-    ax = axes_of(ax, (7.0, 4.8))
+    ax = axes_of(place, (7.0, 4.8))
     order = sorted(range(len(rows)), key=lambda k: rows[k].value)
     edges = _edges([rows[k].value for k in order])
     seen: dict[int, bool] = {}
@@ -499,7 +499,7 @@ def draw_map(name: str, rows: Sequence[MapRow], curves: Sequence[Any], title: st
             count, a, b = row.between[number], float(first), float(last)
             colour = _COLOURS[min(max(count, 1), len(_COLOURS)) - 1]
             seen[count] = seen.get(count, True) and row.exact
-            ax.add_patch(Rectangle((a, low), b - a, high - low, facecolor=colour, alpha=_PALE, linewidth=0, zorder=1))
+            ax.add_patch(Rectangle((a, low), b - a, high - low, facecolor=colour, alpha=0.45, linewidth=0, zorder=1))
             line = _UNIQUE if count == 1 and row.exact else colour if count > 1 else "#999999"
             ax.plot([a, b], [row.value] * 2, color=line, linewidth=2.2, solid_capstyle="butt", zorder=3)
     for curve in curves:

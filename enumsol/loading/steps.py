@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from fractions import Fraction
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, cast
 
 import numpy as np
 
@@ -108,7 +108,7 @@ class LoadStep(Sealed):
         alpha = self.exact_alpha + part * (other.exact_alpha - self.exact_alpha)
         share = float(part)
 
-        def mixed(a: Any, b: Any) -> Any:
+        def mixed(a: Floats | None, b: Floats | None) -> Floats | None:
             return None if a is None or b is None else (1.0 - share) * a + share * b
 
         if (self.load is None) != (other.load is None) or (self.friction is None) != (other.friction is None):
@@ -146,7 +146,7 @@ def steps_of(problem: Problem, steps: object) -> tuple[LoadStep, ...]:
     """
     expected = _EXPECTED.format(last=problem.n - 1)
     if hasattr(steps, "columns"):
-        found = _from_table(problem, steps, expected)
+        found = _from_table(problem, cast("pd.DataFrame", steps), expected)
     elif isinstance(steps, (str, bytes, Mapping)) or not isinstance(steps, Iterable):
         raise InvalidArgumentError(f"steps is {shown(steps)}; {expected}")
     else:
@@ -175,12 +175,12 @@ def read_steps(file: str | Path) -> pd.DataFrame:
         raise InvalidArgumentError(f"steps {file} is not a table ({why}); expected a CSV file with a header") from error
 
 
-def _step(item: Any, number: int, expected: str) -> LoadStep:
+def _step(item: ArrayLike | LoadStep, number: int, expected: str) -> LoadStep:
     if isinstance(item, LoadStep):
         return item
     try:
         if isinstance(item, str) or exact_number(item) is not None:
-            return LoadStep(item)
+            return LoadStep(alpha_value(item))
         if np.ndim(item) == 1:
             return LoadStep(load=item)
     except InvalidArgumentError as error:
@@ -190,7 +190,7 @@ def _step(item: Any, number: int, expected: str) -> LoadStep:
     raise InvalidArgumentError(f"step {number} is {shown(item)}; {expected}")
 
 
-def _from_table(problem: Problem, table: Any, expected: str) -> list[LoadStep]:
+def _from_table(problem: Problem, table: pd.DataFrame, expected: str) -> list[LoadStep]:
     names = [str(name).strip() for name in table.columns]
     components = [f"f{k}" for k in range(problem.n)]
     loads = [name for name in names if name not in ("alpha", "friction")]
@@ -222,9 +222,9 @@ def _friction_varies(problem: Problem) -> bool:
     return bool(np.any(problem.friction_slope))
 
 
-def _array(value: Any, name: str) -> Any:
-    if exact_number(value) is not None:
-        return float(value)
+def _array(value: ArrayLike, name: str) -> Any:
+    if (number := exact_number(value)) is not None:
+        return float(number)
     if isinstance(value, tuple):  # a pair of coefficients in 3D, each a number or an array
         value = np.stack(np.broadcast_arrays(*(plain_array(part, name, error=InvalidArgumentError) for part in value)))
         return sealed(real_array(value.T, name, error=InvalidArgumentError))

@@ -137,7 +137,13 @@ class ContactBody(Immutable):
             raise InvalidArgumentError(
                 "the problem has no mass and no mesh; expected mass, an (n, n) matrix, of the problem or of this call"
             )
-        return self.mesh.mass()
+        M = self.mesh.mass()
+        # what is held but stays in the problem, uncoupled and at rest, has no part in any motion
+        alone = np.diff(self.A.indptr) == 1
+        if np.all(alone) or not np.any(alone):
+            return M
+        coupled = sp.diags_array(np.where(alone, 0.0, 1.0))
+        return sp.csc_array(coupled @ M @ coupled + sp.diags_array(np.where(alone, M.diagonal(), 0.0)))
 
     @property
     def n(self) -> int:

@@ -97,16 +97,11 @@ class BodyMesh(Immutable):
 
     @classmethod
     def of_dofs(
-        cls,
-        points: ArrayLike,
-        cells: ArrayLike,
-        dofs: ArrayLike,
-        offset: ArrayLike | None = None,
-        facets: ArrayLike | None = None,
-        rows: ArrayLike | None = None,
-        lame: ArrayLike | None = None,
+        cls, points: ArrayLike, cells: ArrayLike, dofs: ArrayLike, *more: ArrayLike | None, **named: ArrayLike | None
     ) -> BodyMesh:
         """The mesh of a problem whose entries of u are the components ``d node + component`` in ``dofs``, (n,).
+
+        The other arguments are offset, facets, rows and lame.
 
         Raises
         ------
@@ -121,7 +116,7 @@ class BodyMesh(Immutable):
             )
         count = len(columns)
         motion = sp.csr_array((np.ones(count), (columns, np.arange(count))), shape=(size, count))
-        return cls(points, cells, motion, offset, facets, rows, lame)
+        return cls(points, cells, motion, *more, **named)
 
     @property
     def motion(self) -> sp.csr_array:

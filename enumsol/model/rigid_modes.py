@@ -87,8 +87,18 @@ class RigidModes(Sealed):
 
         Rounded upward from the exact inverse of the modes at the springs.
         """
-        inverse = _inverse([[Fraction(x) for x in row] for row in self.N[self.held].tolist()])
-        most = [Fraction(largest) * sum(map(abs, row)) for row in inverse]
+        from enumsol.arithmetic.rationals import (  # python-flint, not for bodies that are held
+            rational_matrix,
+            to_fraction,
+        )
+
+        if not self.r:
+            return np.zeros(0)
+        try:
+            inverse = rational_matrix(self.N[self.held]).inv().tolist()
+        except ZeroDivisionError:
+            raise InvalidProblemError("rigid_modes has linearly dependent columns; expected independent ones") from None
+        most = [Fraction(largest) * sum(abs(to_fraction(x)) for x in row) for row in inverse]
         nearest = np.array([float(x) for x in most])
         low = [Fraction(x) < exact for x, exact in zip(nearest.tolist(), most, strict=True)]
         return np.where(low, np.nextafter(nearest, np.inf), nearest)
@@ -146,19 +156,3 @@ def _pivots(N: Floats) -> Any:
             rest[:, column] -= rest[:, pivot] * (rest[row, column] / rest[row, pivot])
             rest[row, column] = 0.0
     return sealed(np.array(sorted(held), dtype=np.intp))
-
-
-def _inverse(table: list[list[Fraction]]) -> list[list[Fraction]]:
-    """The inverse of a small matrix, exactly; InvalidProblemError where there is none."""
-    size = len(table)
-    rows = [[*row, *(Fraction(int(i == j)) for j in range(size))] for i, row in enumerate(table)]
-    for k in range(size):
-        pivot = next((i for i in range(k, size) if rows[i][k]), None)
-        if pivot is None:
-            raise InvalidProblemError("rigid_modes has linearly dependent columns; expected independent ones")
-        rows[k], rows[pivot] = rows[pivot], rows[k]
-        rows[k] = [x / rows[k][k] for x in rows[k]]
-        for i in range(size):
-            if i != k and rows[i][k]:
-                rows[i] = [x - rows[i][k] * y for x, y in zip(rows[i], rows[k], strict=True)]
-    return [row[size:] for row in rows]

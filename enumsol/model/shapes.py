@@ -17,12 +17,8 @@ if TYPE_CHECKING:
     from enumsol.model.mesh import BodyMesh
     from enumsol.model.problem3d import AnyProblem
 
-#: Displacements are drawn so that the largest takes this part of the body's size, and forces likewise.
-_MOVED, _LONGEST = 0.08, 0.16
 #: Length of an arrow along a slip, whatever the slip, as a part of the body's size.
 SLIP_ARROW = 0.12
-#: Bodies whose largest displacements differ by more than this factor are each drawn with an enlargement of their own.
-_ALIKE = 8.0
 #: Nodal forces below this part of the largest are rounding.
 _LEAST_FORCE = 1e-9
 #: Displacements below this part of those without contact forces are what rounding leaves where forces cancel the load;
@@ -34,8 +30,6 @@ SIGNS = 12
 _SIDE = float(np.cos(np.radians(30.0)))
 #: Directions from which a solid may first be seen, as azimuths and elevations; the usual one is preferred a little.
 _AZIMUTHS, _ELEVATIONS, _USUAL, _PREFERRED = range(-180, 180, 15), (-35, -20, 20), (-57, 22), 0.2
-#: Cosine of the angle with a normal below which nothing more of a surface is gained.
-_OBLIQUE = 0.6
 
 
 @dataclass(frozen=True)
@@ -124,7 +118,7 @@ def _mesh_of(problem: AnyProblem) -> BodyMesh:
     return problem.mesh
 
 
-def round_scale(largest: float, size: float, share: float = _MOVED) -> float:
+def round_scale(largest: float, size: float, share: float = 0.08) -> float:
     """A factor of the form 1, 2 or 5 times a power of ten by which ``largest`` takes about that share of the size."""
     if not largest > 0:
         return 1.0
@@ -140,7 +134,7 @@ def own_scales(largest: Sequence[float], size: float) -> tuple[float, ...]:
     """
     moved = [value for value in largest if value > 0]
     common = round_scale(max(largest), size)
-    if not moved or max(moved) <= _ALIKE * min(moved):
+    if not moved or max(moved) <= 8.0 * min(moved):
         return (common,) * len(largest)
     return tuple(round_scale(value, size) if value > 0 else common for value in largest)
 
@@ -280,8 +274,8 @@ def first_view(normals: Floats) -> Floats:
     """
     usual = _direction(*_USUAL)
     ways = np.array([usual, *(_direction(a, e) for e in _ELEVATIONS for a in _AZIMUTHS)])
-    # from straight above a solid looks flat
-    seen = np.mean(np.clip(normals @ ways.T, 0.0, _OBLIQUE), axis=0)
+    # from straight above a solid looks flat: below this cosine nothing more of a surface is gained
+    seen = np.mean(np.clip(normals @ ways.T, 0.0, 0.6), axis=0)
     return np.asarray(ways[np.argmax(seen + _PREFERRED * (ways @ usual))])
 
 
@@ -291,5 +285,5 @@ def _direction(azimuth: float, elevation: float) -> Floats:
 
 
 def arrow_scale(largest: float, size: float) -> float:
-    """Length of an arrow for a unit of force."""
-    return _LONGEST * size / largest if largest > 0 else 0.0
+    """Length of an arrow for a unit of force: the longest takes this part of the body's size."""
+    return 0.16 * size / largest if largest > 0 else 0.0

@@ -73,11 +73,11 @@ class BegunProof:
         return next(self._records(), None)
 
     def records(self) -> Iterator[Any]:
-        """What follows the header, up to the last record that is whole."""
+        """Records after the header, up to the last one that is whole."""
         return itertools.islice(self._records(), 1, None)
 
     def extent(self) -> ProofExtent:
-        """How far the file goes."""
+        """Extent of the file."""
         needed = nodes = undecided = 0
         for number, line in enumerate(itertools.islice(self._lines(), 1, None), start=1):
             if not line.startswith(_OPEN):

@@ -63,12 +63,12 @@ class CurveBoxRecord(Record):
 
     @classmethod
     def around(cls, box: CurveBox) -> CurveBoxRecord:
-        """That of a box."""
+        """Record of a box."""
         return cls(box.centre, box.direction, box.border, box.radius, box.rho, box.half)
 
     @property
     def box(self) -> CurveBox:
-        """What it stands for."""
+        """Box of this record."""
         return CurveBox(self.centre, self.direction, self.border, self.half, self.radius, self.rho)
 
 
@@ -78,7 +78,7 @@ PARTS = {"s": 1, "f": 3, "c": 4, "h": 2, "u": 1}
 
 @dataclass(frozen=True, eq=False)
 class CurvePart:
-    """What the curve of a link does between two places, or how that part is cut (theory, section 12.10).
+    """A part of the curve of a link between two places, or a cut of it (theory, section 12.10).
 
     Attributes
     ----------
@@ -104,11 +104,11 @@ class CurvePart:
         return cls(kind, tuple(boxes))
 
     def write(self) -> list[Any]:
-        """As ``read`` takes it."""
+        """The part as ``read`` takes it."""
         return [self.kind, *(None if box is None else box.write() for box in self.boxes)]
 
 
-def box_from(record: Any, limits: Limits) -> CurveBoxRecord:
+def box_from(record: object, limits: Limits) -> CurveBoxRecord:
     """A box; RecordError where it is none."""
     if not isinstance(record, list) or record[:1] != [CurveBoxRecord.kind]:
         raise RecordError(f"{quoted(record)} is no box")
@@ -125,7 +125,7 @@ class CutPiece(Record):
     alpha: str
 
     def between(self, low: Fraction, high: Fraction) -> Fraction:
-        """Where it is cut; RecordError where that is not within the piece."""
+        """Alpha of the cut; RecordError where it is not within the piece."""
         try:
             alpha = rational_from(self.alpha)
         except ValueError as error:
@@ -144,9 +144,9 @@ class OnCurve(ClosingRecord):
     first, last : int
         Boxes of the curve.
     numbers : array or None
-        Of a form, as ``trusted.space.piece_forms.PieceWeights.of`` takes them, by which a run of the curve from the
-        first to the last box has all solutions with the statuses of the assignment. Without it the assignment is
-        complete, and its solutions lie in the boxes.
+        Of a form (see ``trusted.space.space_uniqueness.PieceWeights.of``) by which a run of the curve from the first to
+        the last box has all solutions with the statuses of the assignment. Without it the assignment is complete, and
+        its solutions lie in the boxes.
     """
 
     kind, sizes, trees = "k", (3, 4), Tree.PIECES

@@ -42,8 +42,8 @@ if TYPE_CHECKING:
     from enumsol.trusted.reference import Reference
     from enumsol.trusted.space.pieces import AlphaPiece
     from enumsol.trusted.space.product_forms import Ellipsoid
-    from enumsol.trusted.space.slip_forms import SlipForm
-    from enumsol.trusted.space.space_reference import SpaceReference
+    from enumsol.trusted.space.sector_margins import SlipForm
+    from enumsol.trusted.space.space_uniqueness import LeafReference
     from enumsol.trusted.uniqueness import ClosedSolution
 
     #: What multipliers bound.
@@ -120,7 +120,7 @@ class Excluded(Record):
         """
         if not isinstance(self.rows, list):
             return exclusion_margin(cast("Any", within), codes, self.rows, self.values, errors) > 0
-        from enumsol.trusted.space.resultants import space_margin  # in 3D only
+        from enumsol.trusted.space.sector_margins import space_margin  # in 3D only
 
         return space_margin(cast("Any", within), codes, self.rows, self.values, errors) > 0
 
@@ -141,7 +141,7 @@ class Excluded(Record):
 
 @dataclass(frozen=True, eq=False)
 class Unbalanced(Record):
-    """Of a body that nothing holds: no forces below the assignment are in balance with its load."""
+    """No forces below the assignment are in balance with the load, of a body that nothing holds."""
 
     kind, sizes, trees = "i", (2,), Tree.FLOATING
 
@@ -171,7 +171,7 @@ class Solved(Record):
 
     @classmethod
     def read(cls, record: list[Any], limits: Limits) -> Any:
-        """As of any record, once the assignment is complete."""
+        """A leaf of this kind, once the assignment is complete."""
         check_complete(limits.codes)
         return super().read(record, limits)
 
@@ -364,10 +364,11 @@ class Alone(ClosingRecord):
         strengths = numbers_from(more[0], 2 * limits.p).reshape(2, -1)
         return cls(chosen, weights, enclosure, strengths, multipliers_from(more[1:], ROW_KINDS * limits.p))
 
-    def holds(self, system: EnclosedSystem, codes: Codes, errors: float = 1.0) -> Any:
+    def holds(self, system: EnclosedSystem, codes: Codes, errors: float = 1.0, near: Floats | None = None) -> Any:
         """The only solution below the assignment, None where that is not proven (theory, sections 6.13 and 12.6).
 
-        A VerifiedSelection; in 3D a SpaceRoot, or an OnlySolution where no leaf is named. ``errors`` as of Excluded.
+        A VerifiedSelection; in 3D a SpaceRoot, or an OnlySolution where no leaf is named, near these normal forces, by
+        default those of the enclosure. ``errors`` as of Excluded.
         """
         if self.strengths is not None and self.terms is not None:
             return lone_root(system, codes, self.selection, self.numbers, self.strengths, *self.terms)
@@ -378,8 +379,9 @@ class Alone(ClosingRecord):
             return space.lone_root(given, codes, self.numbers, self.selection, errors)
         if self.selection:
             return space.only_root(given, self.numbers, self.selection, errors)
-        force, _ = self.enclosure.numbers(len(system.g))
-        return space.only_solution_in_space(given, self.numbers, force[: len(codes)], errors)
+        if near is None:
+            near = self.enclosure.numbers(len(system.g))[0][: len(codes)]
+        return space.only_solution_in_space(given, self.numbers, near, errors)
 
     def entries(self) -> Iterable[Any]:
         """Multipliers as two texts."""
@@ -463,15 +465,15 @@ class OnlyReference(ClosingRecord):
         return cls(back, equations, said, EnclosureRecord(*enclosure) if enclosure else None)
 
     @staticmethod
-    def _row(row: Any, limits: Limits) -> Any:
+    def _row(row: object, limits: Limits) -> Any:
         if limits.in_space:
             return checked_row(row, limits.p)
         if type(row) is not int or not 0 <= row < ROW_KINDS * limits.p:
             raise RecordError("its rows are not numbers of rows")
         return row
 
-    def holds(self, known: Reference | SpaceReference, codes: Codes, reach: Floats) -> bool:
-        """True if no other root lies below the assignment than that of a form, a Reference or SpaceReference.
+    def holds(self, known: Reference | LeafReference, codes: Codes, reach: Floats) -> bool:
+        """True if no other root lies below the assignment than that of a form, a Reference or LeafReference.
 
         ``reach``: within these bounds of the rigid displacement (theory, section 14.11).
         """

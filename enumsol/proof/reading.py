@@ -81,7 +81,7 @@ def data_of(header: Any, problem: ContactProblem, kind: str | None) -> Data:
     return "problem"
 
 
-def same(found: Any, expected: Any) -> bool:
+def same(found: object, expected: object) -> bool:
     """True if a value of a proof is the one expected, of the same type throughout: neither ``true`` nor 1.0 is 1."""
     if isinstance(expected, dict) and isinstance(found, dict):
         return found.keys() == expected.keys() and all(same(found[key], value) for key, value in expected.items())
@@ -114,7 +114,7 @@ def fits(value: Fraction) -> bool:
     return max(abs(value.numerator), value.denominator) < _BEYOND
 
 
-def rational_from(text: Any) -> Fraction:
+def rational_from(text: object) -> Fraction:
     """An alpha from its text: digits, or digits / digits, with a sign before them.
 
     The one way in which a fraction of a proof becomes a number. Numerator and denominator have at most MOST_DIGITS
@@ -133,15 +133,19 @@ def rational_from(text: Any) -> Fraction:
     return value
 
 
-def units_from(header: dict[str, Any], p: int) -> tuple[Floats, Floats]:
-    """Units of forces and displacements, (2p,) powers of two, whose binary exponents a record gives."""
-    force, length = (exponents_from(header.get(key), 2 * p) for key in ("force", "length"))
-    if len({a + b for a, b in zip(force, length, strict=True)}) != 1 or force[:p] != force[p:]:
-        raise ValueError("the units are not a common scaling of energy and of the two directions of a node")
+def units_from(header: dict[str, Any], p: int, *, by_node: bool = False) -> tuple[Floats, Floats]:
+    """Units of forces and displacements, powers of two, whose binary exponents a record gives.
+
+    In 2D (2p,), those of both directions of a node being the same; ``by_node``, in 3D, (p,).
+    """
+    force, length = (exponents_from(header.get(key), p if by_node else 2 * p) for key in ("force", "length"))
+    if len({a + b for a, b in zip(force, length, strict=True)}) != 1 or force[:p] != force[-p:]:
+        directions = "" if by_node else " and of the two directions of a node"
+        raise ValueError(f"the units are no common scaling of energy{directions}")
     return np.ldexp(1.0, np.array(force)), np.ldexp(1.0, np.array(length))
 
 
-def exponents_from(value: Any, size: int) -> list[int]:
+def exponents_from(value: object, size: int) -> list[int]:
     """``size`` binary exponents of units."""
     if not (
         isinstance(value, list)
@@ -183,7 +187,7 @@ def multipliers_from(texts: list[Any], most: int | None, ends: int = 1) -> Terms
     return Terms(row.astype(np.intp), value)
 
 
-def numbers_from(values: Any, size: int) -> Floats:
+def numbers_from(values: object, size: int) -> Floats:
     """``size`` finite numbers."""
     if not isinstance(values, list) or len(values) != size or not all(type(x) in (int, float) for x in values):
         raise ValueError(f"expected {size} numbers")
@@ -193,7 +197,7 @@ def numbers_from(values: Any, size: int) -> Floats:
     return numbers
 
 
-def codes_from(texts: Any, p: int) -> NDArray[np.uint8]:
+def codes_from(texts: object, p: int) -> NDArray[np.uint8]:
     """Status codes, (k, p), from k texts of p digits each."""
     if not isinstance(texts, list) or not all(isinstance(text, str) and len(text) == p for text in texts):
         raise ValueError(f"expected status codes as texts of {p} digits")
@@ -212,14 +216,14 @@ def check_complete(codes: Codes) -> None:
         raise RecordError("a root or a solved selection is claimed where statuses are still open")
 
 
-def is_code_of_leaf(code: Any) -> bool:
+def is_code_of_leaf(code: object) -> bool:
     """True for a status in 3D that is not undecided, or that of a sector."""
     from enumsol.model.sectors import SECTORS, is_sector  # in 3D only
 
     return type(code) is int and (0 <= code < UNDECIDED or (code > SECTORS and is_sector(code - SECTORS)))
 
 
-def checked_row(row: Any, p: int) -> Row:
+def checked_row(row: object, p: int) -> Row:
     """A row in 3D; ValueError where there is none such."""
     from enumsol.model.sectors import DEEPEST, RUN  # in 3D only
     from enumsol.trusted.space.sector_rows import FORCE, GAP, RIGHT
@@ -234,7 +238,7 @@ def checked_row(row: Any, p: int) -> Row:
     return kind, node, number
 
 
-def selection_from(value: Any, friction: Sequence[bool], sliding: Iterable[int] = ()) -> Codes:
+def selection_from(value: object, friction: Sequence[bool], sliding: Iterable[int] = ()) -> Codes:
     """Final codes; FORWARD and BACKWARD are allowed as well at the given nodes."""
     if not isinstance(value, list) or len(value) != len(friction) or not all(type(code) is int for code in value):
         raise ValueError(f"its selection is not a list of {len(friction)} codes")
@@ -245,7 +249,7 @@ def selection_from(value: Any, friction: Sequence[bool], sliding: Iterable[int] 
     return tuple(value)
 
 
-def nodes_from(value: Any, p: int) -> Codes:
+def nodes_from(value: object, p: int) -> Codes:
     """Ascending nodes."""
     if not isinstance(value, list) or not all(type(i) is int and 0 <= i < p for i in value):
         raise ValueError("its free nodes are not a list of nodes")
@@ -254,7 +258,7 @@ def nodes_from(value: Any, p: int) -> Codes:
     return tuple(value)
 
 
-def weights_from(value: Any, free: Codes, codes: Codes, friction: Sequence[bool]) -> Floats:
+def weights_from(value: object, free: Codes, codes: Codes, friction: Sequence[bool]) -> Floats:
     """The numbers of the form: one for every free or sliding node, and four more where a free node has friction."""
     sliding = sum(code in _SLIDING for code in codes)
     return numbers_from(value, len(free) + sliding + 4 * sum(friction[i] for i in free))
@@ -268,7 +272,7 @@ def friction_at(problem: ContactProblem, alpha: Fraction) -> list[Fraction]:
     return exact
 
 
-def quoted(value: Any) -> str:
+def quoted(value: object) -> str:
     """Any value from a proof as a short text."""
     return _SHORT.repr(value)
 

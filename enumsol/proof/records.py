@@ -1,4 +1,4 @@
-"""What all trees of a proof have: branchings, forms, and the base of all records, with their limits.
+"""Records of all trees of a proof: branchings, forms, and the base of all kinds, with their limits.
 
 A record is a class: a search writes it, and the checker, and a search that resumes from an earlier proof, read it
 strictly. Reading says whether a record makes sense, never that it is true. docs/proof_format.md says what each of them
@@ -48,7 +48,7 @@ class Tree(Flag):
 
 @dataclass(frozen=True, eq=False)
 class Limits:
-    """What a record may say, by the place in the tree where it stands.
+    """Limits of a record, by the place in the tree where it stands.
 
     Attributes
     ----------
@@ -114,14 +114,14 @@ class Record:
 
     @classmethod
     def read(cls, record: list[Any], limits: Limits) -> Any:
-        """What a record of this kind says; ValueError where it makes no sense."""
+        """A record of this kind; ValueError where it makes no sense."""
         if len(record) not in cls.sizes:
             raise RecordError(cls.unfit.format(len(record), " or ".join(map(str, cls.sizes))))
         return cls.of(record[1:], limits)
 
     @classmethod
     def of(cls, entries: list[Any], limits: Limits) -> Any:
-        """The same from the entries after the first, of which there are as many as there may be."""
+        """A record from its entries after the first, of which there are as many as there may be."""
         return cls(*entries)
 
     def write(self) -> list[Any]:
@@ -129,7 +129,7 @@ class Record:
         return [self.kind, *(value.tolist() if isinstance(value, np.ndarray) else value for value in self.entries())]
 
     def entries(self) -> Iterable[Any]:
-        """What follows the kind: the fields, arrays as one list, enclosures by parts, and nothing for None."""
+        """Entries after the kind: the fields, arrays as one list, enclosures by parts, and nothing for None."""
         for field in fields(self):  # type: ignore[arg-type]
             value = getattr(self, field.name)
             if isinstance(value, EnclosureRecord):
@@ -171,7 +171,7 @@ class Branching(Record):
 
 @dataclass(frozen=True, eq=False)
 class EnclosureRecord:
-    """Where a record says that its root is, and the root's index; read where they are compared with the root's own."""
+    """Ball and index of a root, as a record has them; read where they are compared with the root's own."""
 
     mid: Any
     rad: Any
@@ -183,7 +183,7 @@ class EnclosureRecord:
 
     @classmethod
     def around(cls, ball: Ball, unit: Floats, index: int | None, wider: float) -> EnclosureRecord:
-        """That of a root, wider than its ball in these units, so that a checker's own ball fits in."""
+        """Enclosure of a root, wider than its ball in these units, so that a checker's own ball fits in."""
         return cls(ball.mid * unit, wider * ball.rad * unit, index)
 
     def refusal(self, ball: Ball, unit: Floats, index: int) -> str | None:
@@ -201,6 +201,10 @@ class EnclosureRecord:
         return iter((self.mid, self.rad, self.index))
 
 
+#: Of a leaf that is tested before its root is known; it is written with another one.
+NOWHERE = EnclosureRecord(None, None, None)
+
+
 @dataclass(frozen=True, eq=False)
 class DeclaredForm(Record):
     """A form to which later leaves refer: of an assignment, or of a root of a body that nothing holds.
@@ -210,8 +214,8 @@ class DeclaredForm(Record):
     codes : of the assignment for which it is made, or of the leaf that holds the root
     numbers : array
         For a body that is held, in 2D the four rows of its multipliers one after the other; in 3D those of
-        ``trusted.space.slip_forms.SlipForm`` over the whole tree, else those of ``product_forms.Ellipsoid``. For
-        other bodies those of ``trusted.reference.Reference`` or ``trusted.space.space_reference.SpaceReference``.
+        ``sector_margins.SlipForm`` over the whole tree, else those of ``product_forms.Ellipsoid``. For
+        other bodies those of ``trusted.reference.Reference`` or ``trusted.space.space_uniqueness.LeafReference``.
     more : array
         In 2D the weight of the equations; of an ellipsoid a point near its centre; of a root balance and share.
     enclosure : EnclosureRecord or None
@@ -241,8 +245,8 @@ class DeclaredForm(Record):
         return cls(tuple(codes), *given, EnclosureRecord(*enclosure) if enclosure else None)
 
     @staticmethod
-    def _counts(codes: Any, numbers: Any, limits: Limits) -> tuple[int, int]:
-        """How many numbers there are of both kinds, of codes that a form may have."""
+    def _counts(codes: object, numbers: object, limits: Limits) -> tuple[int, int]:
+        """Counts of numbers of both kinds, for codes that a form may have."""
         if not isinstance(codes, list) or len(codes) != limits.p or not all(type(code) is int for code in codes):
             raise ValueError(f"its codes are not a list of {limits.p} codes")
         whole = all(code == UNDECIDED for code in codes)
@@ -261,12 +265,12 @@ class DeclaredForm(Record):
         return count, 0 if whole else limits.components
 
     def same(self, other: DeclaredForm) -> bool:
-        """Whether another record says the same."""
+        """True if another record says the same."""
         pairs = (self.numbers, other.numbers), (self.more, other.more)
         return self.codes == other.codes and all(np.array_equal(*pair) for pair in pairs)
 
     def serves(self, codes: Sequence[int], *, in_space: bool = False) -> bool:
-        """Whether a partial assignment is part of the one that this form is made for."""
+        """True if a partial assignment is part of the one that this form is made for."""
         if in_space and any(code != UNDECIDED for code in self.codes):
             from enumsol.trusted.space.product_forms import refines as is_below  # in 3D only
 
@@ -277,7 +281,7 @@ class DeclaredForm(Record):
     def form(self, system: EnclosedSystem) -> Any:
         """The form of an assignment, its ellipsoid, or the form of a root; None where it is not proven to be definite.
 
-        An EnclosedForm or Reference, in 3D a SlipForm (of the whole tree), Ellipsoid or SpaceReference.
+        An EnclosedForm or Reference, in 3D a SlipForm (of the whole tree), Ellipsoid or LeafReference.
 
         Raises
         ------
@@ -289,12 +293,12 @@ class DeclaredForm(Record):
                 return Reference.of(system, self.codes, self.numbers, *self.more.tolist())
             return EnclosedForm.of(system, self.codes, self.numbers.reshape(4, -1), float(self.more[0]))
         from enumsol.trusted.space.product_forms import Ellipsoid  # in 3D only
-        from enumsol.trusted.space.slip_forms import SlipForm
-        from enumsol.trusted.space.space_reference import SpaceReference
+        from enumsol.trusted.space.sector_margins import SlipForm
+        from enumsol.trusted.space.space_uniqueness import LeafReference
 
         given = cast("EnclosedSpace", system)
         if not system.held:
-            return SpaceReference.of(given, self.codes, self.numbers, *self.more.tolist())
+            return LeafReference.of(given, self.codes, self.numbers, *self.more.tolist())
         if all(code == UNDECIDED for code in self.codes):
             return SlipForm.of(given, self.numbers)
         return Ellipsoid.of(given, self.codes, self.more / given.unit, self.numbers)

@@ -15,6 +15,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Generic, TypeVar
 
 import numpy as np
+import scipy.sparse as sp
 from scipy.linalg import cho_factor, cho_solve, qr, solve_triangular
 
 from enumsol.arithmetic.balls import factor_above
@@ -23,13 +24,11 @@ from enumsol.relaxation.imposed_rows import row_normals
 from enumsol.relaxation.space_relaxation import SpaceRelaxation
 from enumsol.support.deadlines import look
 from enumsol.trusted.quadratic_forms import EnclosedForm, Equations
+from enumsol.trusted.space.sector_margins import SlipForm
 from enumsol.trusted.space.sector_rows import sector_row_terms
-from enumsol.trusted.space.slip_forms import SlipForm
 from enumsol.trusted.status_rows import CONTACT, UNDECIDED
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
-
     from enumsol.condensation.condensed import ScaledSystem
     from enumsol.condensation.enclosure import EnclosedSystem
     from enumsol.condensation.space_condensed import EnclosedSpace
@@ -44,17 +43,8 @@ _Relaxation = TypeVar("_Relaxation", ActiveSetRelaxation, SpaceRelaxation)
 
 #: Weights of the bound and of the barriers of multipliers beside that of the determinant, for every unknown.
 _BOUND, _BARRIER = 0.125, 0.05
-#: Lengths are shortened by this until the form is convex, then once more; then halved, so many times at most.
-_SHORTER, _INSIDE, _TRIALS, _SHORTEST = 0.7, 0.85, 8, 1e-3
-#: In 2D: multipliers with a sign are kept above this share of the largest, one step moves their logs this far at most,
-#: and a step ends the ascent when it promises less than this.
-_LEAST, _FURTHEST, _ENOUGH = 1e-4, 2.0, 1.0
-#: First weight of the equations by the mean curvature, how often it is multiplied by ten, and the least curvature.
-_WEIGHT, _HEAVIER, _CURVATURE = 10.0, 6, 1e-9
-#: Part of a normal outside the span of others below which it counts as in it.
-_DEPENDENT = 1e-10
-#: In 3D: steps of the ascent, what two of them have to gain together, and how much shorter vectors c are than kappa.
-_STEPS, _GAIN, _WITHIN = 16, 0.1, 1.0 - 1e-9
+#: Part of the longest step that leaves the form convex: after a longer one the next ones are short.
+_INSIDE = 0.85
 
 
 @dataclass(frozen=True)
@@ -72,18 +62,25 @@ class _Candidate(Generic[_Form, _Relaxation]):
 
 
 class FormAscent(ABC, Generic[_Form, _Relaxation]):
-    """Newton's method for the multipliers of a form that bounds one partial assignment."""
+    """Newton's method for the multipliers of a form that bounds one partial assignment.
+
+    A form is the sum, with multipliers, of products of a factor in y and one in S y - g.
+    """
 
     #: The length of a first step that leaves the form convex.
     whole: float
+    #: S and g, shapes (m, m) and (m,).
+    S: Floats
+    g: Floats
+    #: Factors of the products: rows of combinations of y, and of S y - g.
+    left: sp.csr_array
+    right: sp.csr_array
+    #: Orthonormal columns that span what the equations of the assignment leave free, shape (m, r).
+    across: Floats
 
     @abstractmethod
     def _form(self, multipliers: Floats) -> _Form | None:
         """The form of these multipliers, if they are allowed."""
-
-    @abstractmethod
-    def _factor(self, form: _Form) -> Floats | None:
-        """The Cholesky factor of a form on the subspace of the assignment; None where it is not convex there."""
 
     @abstractmethod
     def _relaxed(self, form: _Form, factor: Floats, multipliers: Floats) -> tuple[_Form, _Relaxation] | None:
@@ -102,9 +99,13 @@ class FormAscent(ABC, Generic[_Form, _Relaxation]):
         """Gradient, and minus the second derivative, of what is maximised."""
 
     def _convex(self, multipliers: Floats) -> tuple[_Form, Floats] | None:
+        """The form of these multipliers and its Cholesky factor on the subspace; None where it is not convex there."""
         form = self._form(multipliers)
-        factor = None if form is None else self._factor(form)
-        return None if form is None or factor is None else (form, factor)
+        if form is None:
+            return None
+        whole = self.across.shape[1] == len(form.h)
+        factor = factor_above(form.H if whole else self.across.T @ form.H @ self.across)
+        return None if factor is None else (form, factor)
 
     def _candidate(self, multipliers: Floats) -> _Candidate[_Form, _Relaxation] | None:
         """The relaxation with these multipliers; None where their form is not convex, or that stalls."""
@@ -129,17 +130,46 @@ class FormAscent(ABC, Generic[_Form, _Relaxation]):
 
         length = 1.0
         while self._convex(self._moved(found.multipliers, length * step)) is None:
-            length *= _SHORTER
-            if length < _SHORTEST:
+            length *= 0.7
+            if length < 1e-3:
                 return None
         length = self.whole if length == 1.0 else _INSIDE * length
-        for _ in range(_TRIALS):
+        for _ in range(8):  # each half as long as the one before
             look()
             trial = self._candidate(self._moved(found.multipliers, length * step))
             if trial is not None and (trial.relaxation.pruned or merit(trial) > merit(found)):
                 return trial, promised
             length *= 0.5
         return None
+
+    def _of_products(
+        self, found: _Candidate[_Form, _Relaxation], scale: float, normals: Floats
+    ) -> tuple[Floats, Floats]:
+        """Gradient, and minus the second derivative, of scale times the bound plus the log of the determinant.
+
+        These are by the multipliers of the products; ``normals`` are those of the rows that are active, on the
+        subspace, (k, r).
+        """
+        S, L, R, forces = self.S, self.left, self.right, found.relaxation.forces
+        left, right = L @ forces, R @ (S @ forces - self.g)
+        X = solve_triangular(found.factor, self.across.T, lower=True)
+        P = X.T @ X
+        PS = P @ S
+        mixed = (R @ (L @ PS).T).T
+        gradient = scale * left * right + np.diagonal(mixed)
+        lefts, rights = L @ (L @ P).T, R @ (R @ (S @ PS)).T
+        bending = scale * self._bending(found.form.H, left, right, normals)
+        return gradient, 0.5 * (lefts * rights + mixed * mixed.T) + bending
+
+    def _bending(self, H: Floats, left: Floats, right: Floats, normals: Floats) -> Floats:
+        """Minus the second derivative of the bound: the minimiser moves on the face of the rows that are active."""
+        free = self.across @ _complement(normals) if len(normals) else self.across
+        factor = factor_above(free.T @ H @ free) if free.shape[1] else None
+        if factor is None:
+            return np.zeros((len(left), len(left)))
+        slopes = (self.left @ free) * right[:, None] + (self.right @ (self.S @ free)) * left[:, None]
+        moved = solve_triangular(factor, slopes.T, lower=True)
+        return np.asarray(0.5 * (moved.T @ moved))
 
 
 class PlaneFormAscent(FormAscent[EnclosedForm, ActiveSetRelaxation]):
@@ -162,15 +192,21 @@ class PlaneFormAscent(FormAscent[EnclosedForm, ActiveSetRelaxation]):
         self, scaled: ScaledSystem, enclosed: EnclosedSystem, engine: ActiveSetEngine, codes: Codes, rows: Rows
     ) -> None:
         self._scaled, self._enclosed, self._engine, self._codes, self._rows = scaled, enclosed, engine, codes, rows
+        self.S, self.g = scaled.S, scaled.g
         p, status = scaled.p, np.asarray(codes)
         a = Equations.of(enclosed, codes).a
-        #: Orthonormal columns that span what the equations leave free, shape (2p, r).
-        self._across = _complement(a) if len(a) else np.eye(2 * p)
+        self.across = _complement(a) if len(a) else np.eye(2 * p)
         normal = status == UNDECIDED
         tangential = (normal | (status == CONTACT)) & (scaled.F > 0)
         #: Numbers of the multipliers (of all 4p) whose terms do not vanish there, and are at most zero at a solution.
         self._live = np.flatnonzero(np.concatenate([normal, normal & tangential, tangential, tangential]))
         self._signed = self._live >= 2 * p
+        one, none = sp.eye_array(p), sp.csr_array((p, p))
+        bound = sp.diags_array(scaled.F)
+        # lambda_n, lambda_t, lambda_t - F lambda_n, lambda_t + F lambda_n, and w_n, w_n, w_t, w_t
+        left = sp.block_array([[one, none], [none, one], [-bound, one], [bound, one]], format="csr")
+        right = sp.block_array([[one, none], [one, none], [none, one], [none, one]], format="csr")
+        self.left, self.right = left[self._live], right[self._live]
 
     @property
     def energy(self) -> Floats:
@@ -190,9 +226,10 @@ class PlaneFormAscent(FormAscent[EnclosedForm, ActiveSetRelaxation]):
         """
         live, start = self._live, np.zeros(multipliers.size)
         values = multipliers.ravel()[live]
-        if not len(live) or not self._across.shape[1]:
+        if not len(live) or not self.across.shape[1]:
             return None
-        start[live] = np.where(self._signed, np.maximum(values, _LEAST * np.max(np.abs(values))), values)
+        # a multiplier with a sign that begins at zero would stay there
+        start[live] = np.where(self._signed, np.maximum(values, 1e-4 * np.max(np.abs(values))), values)
         with np.errstate(over="ignore", invalid="ignore", divide="ignore"):
             found = self._candidate(start)
             for _ in range(steps):
@@ -201,26 +238,23 @@ class PlaneFormAscent(FormAscent[EnclosedForm, ActiveSetRelaxation]):
                 if better is None:
                     break
                 found, promised = better
-                if promised < _ENOUGH:
+                if promised < 1.0:
                     break
         return None if found is None else (found.form, found.relaxation)
 
     def _form(self, multipliers: Floats, weight: float = 0.0) -> EnclosedForm:
         return EnclosedForm.of(self._enclosed, self._codes, multipliers.reshape(4, -1), weight)
 
-    def _factor(self, form: EnclosedForm) -> Floats | None:
-        whole = self._across.shape[1] == len(form.h)
-        return factor_above(form.H if whole else self._across.T @ form.H @ self._across)
-
     def _relaxed(
         self, form: EnclosedForm, factor: Floats, multipliers: Floats
     ) -> tuple[EnclosedForm, ActiveSetRelaxation] | None:
         mean = float(np.sum(factor * factor)) / len(factor)
-        weights = [_WEIGHT * mean * 10.0**k for k in range(_HEAVIER)] if len(factor) < len(form.h) else [0.0]
+        # of the equations: light ones leave the form concave off the subspace, heavy ones lose digits
+        weights = [10.0 * mean * 10.0**k for k in range(6)] if len(factor) < len(form.h) else [0.0]
         for weight in weights:
             trial = self._form(multipliers, weight) if weight else form
-            if factor_above(trial.H, _CURVATURE * mean) is not None:
-                return trial, self._engine.bounding(self._scaled, trial).root(*self._rows)
+            if factor_above(trial.H, 1e-9 * mean) is not None:
+                return trial, self._engine.bounding(trial).root(*self._rows)
         return None
 
     def _barrier(self, multipliers: Floats) -> float:
@@ -228,7 +262,7 @@ class PlaneFormAscent(FormAscent[EnclosedForm, ActiveSetRelaxation]):
 
     def _moved(self, multipliers: Floats, change: Floats) -> Floats:
         values, live = multipliers.copy(), self._live
-        grown = multipliers[live] * np.exp(np.clip(change, -_FURTHEST, _FURTHEST))
+        grown = multipliers[live] * np.exp(np.clip(change, -2.0, 2.0))
         values[live] = np.where(self._signed, grown, multipliers[live] + change)
         return values
 
@@ -236,12 +270,8 @@ class PlaneFormAscent(FormAscent[EnclosedForm, ActiveSetRelaxation]):
         """With respect to the logs of multipliers that have a sign."""
         scaled, live, signed = self._scaled, self._live, self._signed
         numbers, _ = found.relaxation.multipliers()
-        normals = row_normals(scaled.p, scaled.F, scaled.S, numbers) @ self._across
-        terms = FormProducts(
-            scaled.S, scaled.g, lambda rows: self._left(rows)[live], lambda rows: self._right(rows)[live]
-        )
-        forces = found.relaxation.forces
-        gradient, hessian = terms.derivatives(found.form.H, found.factor, forces, scale, normals, self._across)
+        normals = row_normals(scaled.p, scaled.F, scaled.S, numbers) @ self.across
+        gradient, hessian = self._of_products(found, scale, normals)
         slope = np.where(signed, found.multipliers[live], 1.0)
         gradient *= slope
         hessian *= slope[:, None] * slope
@@ -251,19 +281,6 @@ class PlaneFormAscent(FormAscent[EnclosedForm, ActiveSetRelaxation]):
         gradient[signed] += _BARRIER
         hessian[np.diag_indices(len(live))] = diagonal
         return gradient, hessian
-
-    # -- the terms of all 4p multipliers: products of a factor in lambda and one in S lambda - g -----------------------
-
-    def _left(self, rows: Floats) -> Floats:
-        """Factors lambda_n, lambda_t, lambda_t - F lambda_n, lambda_t + F lambda_n, given rows for lambda."""
-        normal, tangential = rows[: self._scaled.p], rows[self._scaled.p :]
-        bound = self._scaled.F[:, None] * normal
-        return np.concatenate([normal, tangential, tangential - bound, tangential + bound])
-
-    def _right(self, rows: Floats) -> Floats:
-        """Factors w_n, w_n, w_t, w_t, given rows for w."""
-        normal, tangential = rows[: self._scaled.p], rows[self._scaled.p :]
-        return np.concatenate([normal, normal, tangential, tangential])
 
 
 class SlipFormAscent(FormAscent[SlipForm, SpaceRelaxation]):
@@ -283,10 +300,13 @@ class SlipFormAscent(FormAscent[SlipForm, SpaceRelaxation]):
     def __init__(self, engine: SpaceEngine, enclosed: EnclosedSpace, rows: Rows) -> None:
         self._engine, self._enclosed, self._system, self._rows = engine, enclosed, engine.system, rows
         system, p, size = self._system, self._system.p, len(self._system.g)
+        self.S, self.g, self.across = system.S, system.g, np.eye(size)
         node, axis = np.nonzero(system.tau >= 0)
         tau = system.tau[node, axis]
-        #: Products of a force and a slip, in the order of mu, kappa and c: their factors' places, and multipliers.
-        self._left, self._right = np.concatenate([np.arange(p), tau, node]), np.concatenate([np.arange(p), tau, tau])
+        # products of a force and a slip, in the order of mu, kappa and c
+        every = sp.eye_array(size, format="csr")
+        self.left = every[np.concatenate([np.arange(p), tau, node])]
+        self.right = every[np.concatenate([np.arange(p), tau, tau])]
         number = np.concatenate([np.arange(p), p + node, p + tau])
         #: Multipliers that have a product, and what a product gets of each of them.
         self._live = np.unique(number)
@@ -295,7 +315,6 @@ class SlipFormAscent(FormAscent[SlipForm, SpaceRelaxation]):
         #: Places of kappa and c of the nodes with friction; a c that does not occur has the last place, a zero.
         rubs = np.flatnonzero(np.any(system.tau >= 0, axis=1))
         self._cones = np.column_stack([p + rubs, np.where(system.tau[rubs] >= 0, p + system.tau[rubs], size + p)])
-        self._products = FormProducts(system.S, system.g, lambda rows: rows[self._left], lambda rows: rows[self._right])
 
     def ascended(self) -> tuple[SlipForm, SpaceRelaxation] | None:
         """The tightest form that was found, with the mean curvature of the energy, and its relaxation; or None."""
@@ -303,10 +322,10 @@ class SlipFormAscent(FormAscent[SlipForm, SpaceRelaxation]):
             p, size = self._system.p, len(self._system.g)
             found = self._candidate(np.concatenate([np.ones(2 * p), np.zeros(size - p)]))
             gaps: list[float] = []
-            while found is not None and not found.relaxation.pruned and len(gaps) < _STEPS:
+            while found is not None and not found.relaxation.pruned and len(gaps) < 16:
                 look()
                 gaps.append(-found.relaxation.bound / self._curvature(found.multipliers))
-                if len(gaps) > 2 and gaps[-1] > (1.0 - _GAIN) * gaps[-3]:
+                if len(gaps) > 2 and gaps[-1] > 0.9 * gaps[-3]:  # two steps have to gain that together
                     break
                 better = self._step(found)
                 if better is None:
@@ -328,12 +347,9 @@ class SlipFormAscent(FormAscent[SlipForm, SpaceRelaxation]):
 
     def _form(self, multipliers: Floats) -> SlipForm | None:
         kappa, c = self._lengths(multipliers)
-        if not np.all(np.linalg.norm(c, axis=1) <= _WITHIN * kappa):
+        if not np.all(np.linalg.norm(c, axis=1) <= (1.0 - 1e-9) * kappa):
             return None
         return SlipForm.of(self._enclosed, multipliers)
-
-    def _factor(self, form: SlipForm) -> Floats | None:
-        return factor_above(form.H)
 
     def _relaxed(self, form: SlipForm, factor: Floats, multipliers: Floats) -> tuple[SlipForm, SpaceRelaxation]:
         return form, self._engine.bounding(form).root(*self._rows)
@@ -348,11 +364,8 @@ class SlipFormAscent(FormAscent[SlipForm, SpaceRelaxation]):
         return values
 
     def _derivatives(self, found: _Candidate[SlipForm, SpaceRelaxation], scale: float) -> tuple[Floats, Floats]:
-        numbers, relaxation = found.multipliers, found.relaxation
-        whole, normals = np.eye(len(found.form.h)), self._normals(relaxation)
-        gradient, hessian = self._products.derivatives(
-            found.form.H, found.factor, relaxation.forces, scale, normals, whole
-        )
+        numbers = found.multipliers
+        gradient, hessian = self._of_products(found, scale, self._normals(found.relaxation))
         slope, curved = np.zeros(len(numbers) + 1), np.zeros((len(numbers) + 1,) * 2)
         slope[self._live] = self._shares @ gradient
         curved[np.ix_(self._live, self._live)] = self._shares @ hessian @ self._shares.T
@@ -376,61 +389,6 @@ class SlipFormAscent(FormAscent[SlipForm, SpaceRelaxation]):
         return np.asarray(normals / np.linalg.norm(normals, axis=1, keepdims=True))
 
 
-@dataclass(frozen=True)
-class FormProducts:
-    """Products of a factor in y and one in S y - g, of which a form is the sum with multipliers.
-
-    Attributes
-    ----------
-    S, g : arrays
-    left, right : callables
-        Rows of the factors of all products, given rows for y and for S y - g.
-    """
-
-    S: Floats
-    g: Floats
-    left: Callable[[Floats], Floats]
-    right: Callable[[Floats], Floats]
-
-    def derivatives(
-        self, H: Floats, factor: Floats, forces: Floats, scale: float, normals: Floats, across: Floats
-    ) -> tuple[Floats, Floats]:
-        """Gradient, and minus the second derivative, of scale times the bound plus the log of the determinant.
-
-        Parameters
-        ----------
-        H : of the form
-        factor : Cholesky factor of H on the subspace
-        forces : (m,) array
-            The minimiser.
-        scale : float
-        normals : (k, r) array
-            Of the rows that are active, on the subspace.
-        across : (m, r) array
-            Columns that span the subspace.
-        """
-        left = self.left(forces[:, None])[:, 0]
-        right = self.right((self.S @ forces - self.g)[:, None])[:, 0]
-        X = solve_triangular(factor, across.T, lower=True)
-        P = X.T @ X
-        PS = P @ self.S
-        mixed = self.right(self.left(PS).T).T
-        gradient = scale * left * right + np.diagonal(mixed)
-        lefts, rights = self.left(self.left(P).T), self.right(self.right(self.S @ PS).T)
-        bending = scale * self._bending(H, left, right, normals, across)
-        return gradient, 0.5 * (lefts * rights + mixed * mixed.T) + bending
-
-    def _bending(self, H: Floats, left: Floats, right: Floats, normals: Floats, across: Floats) -> Floats:
-        """Minus the second derivative of the bound: the minimiser moves on the face of the rows that are active."""
-        free = across @ _complement(normals) if len(normals) else across
-        factor = factor_above(free.T @ H @ free) if free.shape[1] else None
-        if factor is None:
-            return np.zeros((len(left), len(left)))
-        slopes = self.left(free) * right[:, None] + self.right(self.S @ free) * left[:, None]
-        moved = solve_triangular(factor, slopes.T, lower=True)
-        return np.asarray(0.5 * (moved.T @ moved))
-
-
 def _newton_step(gradient: Floats, hessian: Floats) -> tuple[Floats, float] | None:
     """The step of Newton's method, given minus the second derivative, and what it promises; None: not definite."""
     hessian[np.diag_indices(len(hessian))] *= 1.0 + 1e-8
@@ -447,4 +405,4 @@ def _complement(rows: Floats) -> Floats:
     """Columns that span what is orthogonal to some rows."""
     Q, R, _ = qr(rows.T, pivoting=True)
     size = np.abs(np.diagonal(R))
-    return np.asarray(Q[:, int(np.sum(size > _DEPENDENT * max(size[0], 1e-300))) :])
+    return np.asarray(Q[:, int(np.sum(size > 1e-10 * max(size[0], 1e-300))) :])

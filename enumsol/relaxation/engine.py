@@ -1,4 +1,4 @@
-"""What a relaxation, a convex QP in lambda, and the engine that solves it offer to the search (theory, section 5)."""
+"""Relaxations, convex QPs in lambda, and engines that solve them, as the search sees them (theory, section 5)."""
 
 from __future__ import annotations
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 
 import numpy as np
+import scipy.sparse as sp
 
 from enumsol.model.statuses import CONDITIONS, FRICTIONLESS, OPEN, UNDECIDED, RowKind
 from enumsol.support.array_types import Floats, Indices
@@ -48,17 +49,10 @@ def row_terms(p: int, F: Floats) -> tuple[Indices, Indices, Floats]:
 
 
 def row_normals(p: int, F: Floats, S: Floats, numbers: Indices) -> Floats:
-    """Gradients by lambda of some rows, up to sign, one below the other; w = g - S lambda."""
-    kind, node = np.divmod(numbers, p)
-    normals = np.zeros((len(numbers), 2 * p))
-    for k, i, normal in zip(kind.tolist(), node.tolist(), normals, strict=True):
-        if k >= _R.PENETRATION:
-            normal[:] = S[i if k == _R.PENETRATION else p + i]
-        elif k in (_R.CONE_PLUS, _R.CONE_MINUS):
-            normal[i], normal[p + i] = F[i], -1.0 if k == _R.CONE_PLUS else 1.0
-        else:
-            normal[i if k == _R.NORMAL_FORCE else p + i] = 1.0
-    return normals
+    """Gradients by lambda of some rows, one below the other; w = g - S lambda."""
+    start, index, value = row_terms(p, F)
+    terms = sp.csr_array((value, index, start), shape=(len(start) - 1, 4 * p))[numbers]
+    return np.asarray(terms[:, : 2 * p].toarray() - terms[:, 2 * p :] @ S)
 
 
 def imposed_rows(code: int, *, friction: bool) -> dict[int, int]:

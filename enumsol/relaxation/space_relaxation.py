@@ -18,30 +18,26 @@ from enumsol.relaxation.imposed_rows import EQUALITY, INEQUALITY
 from enumsol.trusted.space import sector_rows
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Iterator, Sequence
+    from collections.abc import Iterator, Sequence
 
     from enumsol.condensation.space_condensed import SpaceSystem
     from enumsol.relaxation._active_set import QPData, QPState
     from enumsol.support.array_types import Codes, Floats, Indices
-    from enumsol.trusted.space.slip_forms import SlipForm
+    from enumsol.trusted.space.sector_margins import SlipForm
 
     Children = dict[tuple[int, ...], "SpaceRelaxation"]
 
 
 #: A slice is this power of 1/2 of its sector: at first, and at least.
 FIRST, THINNEST = 1, 2
-#: An end that kept the thinnest slice is tried again when the product of all widths is less than half of what it was.
-_AGAIN = 1.0
 #: A leaf whose sectors all have this level or a deeper one is tested before anything is cut off. A sector in which
 #: nothing is violated is not cut from this level on: near a degenerate root that would go on for many levels.
 NARROW = 8
-#: The next test is made when the sectors have become narrower by this power of 1/2 on average.
-_NARROWER = 0.5
 
 
 @dataclass
 class Shaving:
-    """What is known at a node of the tree about its sectors, from it and from those above it.
+    """Knowledge about the sectors at a node of the tree, from it and from those above it.
 
     Attributes
     ----------
@@ -66,7 +62,8 @@ class Shaving:
         """The slices to be tried at an end of a sector, as numbers of halvings, one after the other."""
         halvings, before = self.tried.get((node, end), (FIRST, math.inf))
         if halvings > THINNEST:
-            if before - _size(codes) < _AGAIN:
+            # tried again once the product of all widths is less than half of what it was
+            if before - _size(codes) < 1.0:
                 return
             halvings = THINNEST
         yield from range(halvings, THINNEST + 1)
@@ -78,7 +75,8 @@ class Shaving:
     def leaf_is_due(self, codes: Codes) -> bool:
         """True if a leaf is to be tested now, which is then noted."""
         levels = [width_level(code - SECTORS) for code in codes if code > SECTORS]
-        if not levels or min(levels) < NARROW or self.tested - _size(codes) < _NARROWER * len(levels):
+        # again when the sectors have become narrower by half a level on average
+        if not levels or min(levels) < NARROW or self.tested - _size(codes) < 0.5 * len(levels):
             return False
         self.tested = _size(codes)
         return True
@@ -89,18 +87,14 @@ def _size(codes: Codes) -> float:
     return math.fsum(math.log2(width_of(code - SECTORS)) for code in codes if code > SECTORS)
 
 
-#: Level of the directions on which tangents are put where the minimiser leaves the disc, and of those put anyway.
-_FINE, COARSE = 10, 3
-#: Rounds of tangents, and how far outside the disc the minimiser must lie: relative to the radius, and at least.
-ROUNDS, _OUTSIDE, _LEAST_OUTSIDE = 4, 1e-3, 1e-9
+#: Level of the directions on which tangents are put in any case: more of them make every program larger.
+COARSE = 3
+#: Rounds of tangents where the minimiser leaves the disc.
+ROUNDS = 4
 #: Sectors of this level and below are halved only where nothing else helps.
 _DEEP = 12
 #: Violations of maximum dissipation below this do not tell which sector to halve.
 _DISSIPATION = 1e-7
-#: How much a violation, and a child's share of the gap to the pruning bound, count in the choice of a node.
-_WEIGHT, _CLOSED = 0.3, 4.0
-#: Rows of a program, and entries of a row.
-_ROWS, _ENTRIES = 24576, 3
 
 
 class SpaceEngine:
@@ -129,7 +123,7 @@ class SpaceEngine:
 
     name = "active-set"
 
-    def __init__(self, system: SpaceSystem, rows: int = _ROWS) -> None:
+    def __init__(self, system: SpaceSystem, rows: int = 24576) -> None:
         try:
             from enumsol.relaxation import _active_set
         except ImportError as error:
@@ -149,7 +143,7 @@ class SpaceEngine:
         self.turning = np.all(system.tau >= 0, axis=1)
         nodes = np.flatnonzero(self.turning)
         #: Of the nodes with both tangents: number, places of tau in y, and factors of tau and of the disc's radius.
-        self._discs = nodes, system.tau[nodes].T, system.tau_scale[nodes].T, system.disc_scale[nodes] * (1.0 + _OUTSIDE)
+        self._discs = nodes, system.tau[nodes].T, system.tau_scale[nodes].T, system.disc_scale[nodes] * (1.0 + 1e-3)
         #: Row by number, for multipliers, and what the program's row is of it.
         self.rows: dict[int, sector_rows.Row] = {}
         self.scale, self._unit = np.ones(self.slots * p), system.row_unit.tolist()
@@ -173,7 +167,7 @@ class SpaceEngine:
     def _bounded(self, H: Floats, h: Floats) -> QPData:
         """Programs that bound y'H y - h'y, without rows."""
         system, rows = self.system, self.slots * self.system.p
-        start, zeros = np.arange(rows + 1, dtype=np.intp) * _ENTRIES, np.zeros(rows * _ENTRIES)
+        start, zeros = 3 * np.arange(rows + 1, dtype=np.intp), np.zeros(3 * rows)  # three entries a row
         return self._programs(H, h, -system.S, system.g, start, zeros.astype(np.intp), zeros, zeros[:rows])
 
     def bounding(self, form: SlipForm) -> SpaceEngine:
@@ -212,10 +206,10 @@ class SpaceEngine:
         return sector_rows.sector_children(code, self.tangents[node])
 
     def outside(self, y: Floats) -> list[tuple[int, float, float]]:
-        """Nodes whose tau is outside the disc of radius lambda_n, with its direction."""
+        """Nodes whose tau is clearly outside the disc of radius lambda_n, with its direction."""
         nodes, places, factors, radii = self._discs
         first, second = y[places] * factors
-        found = np.flatnonzero(np.hypot(first, second) > y[nodes] * radii + _LEAST_OUTSIDE)
+        found = np.flatnonzero(np.hypot(first, second) > y[nodes] * radii + 1e-9)
         return list(zip(nodes[found].tolist(), first[found].tolist(), second[found].tolist(), strict=True))
 
     def root(self, rows: list[int], modes: list[int]) -> SpaceRelaxation:
@@ -230,10 +224,8 @@ def imposed(tau: Indices, node: int, code: int) -> list[tuple[sector_rows.Row, i
     equations: list[sector_rows.Row] = []
     (inequalities if code in (OPEN, UNDECIDED) else equations).append((sector_rows.GAP, node, 0))
     if code == OPEN:
-        return [
-            *_with(inequalities[1:], INEQUALITY),
-            *_with([(sector_rows.FORCE, node, 0), *((sector_rows.TAU, node, k) for k in axes)], EQUALITY),
-        ]
+        equations = [(sector_rows.FORCE, node, 0), *((sector_rows.TAU, node, k) for k in axes)]
+        return [(inequalities[1], INEQUALITY), *((row, EQUALITY) for row in equations)]
     if len(axes) == 2:
         inequalities += [(sector_rows.TANGENT, node, (1 << COARSE) + k) for k in range(1 << COARSE)]
     elif axes:
@@ -250,11 +242,7 @@ def imposed(tau: Indices, node: int, code: int) -> list[tuple[sector_rows.Row, i
             (sector_rows.TANGENT, node, n) for n in (start_number(number), middle_number(number), end_number(number))
         ]
         inequalities += [(kind, node, number) for kind in (sector_rows.CHORD, sector_rows.LEFT, sector_rows.RIGHT)]
-    return [*_with(inequalities, INEQUALITY), *_with(equations, EQUALITY)]
-
-
-def _with(rows: Iterable[sector_rows.Row], mode: int) -> list[tuple[sector_rows.Row, int]]:
-    return [(row, mode) for row in rows]
+    return [(row, mode) for rows, mode in ((inequalities, INEQUALITY), (equations, EQUALITY)) for row in rows]
 
 
 class SpaceRelaxation:
@@ -292,7 +280,7 @@ class SpaceRelaxation:
         """Rows of tangents at nodes whose tau is outside the disc of radius lambda_n."""
         engine, rows = self._engine, []
         for node, x, y in engine.outside(self.forces):
-            slot = engine.slot((sector_rows.TANGENT, node, nearest(x, y, _FINE)))
+            slot = engine.slot((sector_rows.TANGENT, node, nearest(x, y, 10)))
             if slot is not None and not self._state.mode_of(slot * engine.system.p + node):
                 rows.append(slot * engine.system.p + node)
         return rows
@@ -364,7 +352,8 @@ class SpaceRelaxation:
             if len(left) <= 1:
                 return self._chosen(children, node)
             closed = np.clip((left - self.bound) / max(PRUNE_MARGIN - self.bound, 1e-300), 0.0, 1.0)
-            promise = float(score[node] ** _WEIGHT / np.sum(np.exp(-_CLOSED * closed)))
+            # how much the violation counts, and a child's share of the gap (studies/search_in_3d_choices)
+            promise = float(score[node] ** 0.3 / np.sum(np.exp(-4.0 * closed)))
             if not most >= promise:
                 best, most = node, promise
         return best

@@ -15,13 +15,10 @@ if TYPE_CHECKING:
 
     from enumsol.fem import Scene
     from enumsol.model.problem3d import AnyProblem
-    from enumsol.support.array_types import Floats, Integers
+    from enumsol.support.array_types import ArrayLike, Floats, Integers
 
 #: Most numbers of displacements, about ten characters each; a mesh with more is drawn by its boundary, or not at all.
 _MOST_NUMBERS = 150_000
-#: Boundary facets of a solid whose edges are all drawn; of more only those at which the surface bends.
-_MOST_EDGES = 2_000
-_DIGITS = 7
 #: Squares of directions below this are rounding, and directions.
 _ROUNDING = 1e-9
 
@@ -146,7 +143,8 @@ def _surface(shape: BodyShape, faces: Integers, new: Integers) -> dict[str, Any]
     fan = [faces[:, [0, k, k + 1]] for k in range(1, faces.shape[1] - 1)]
     return {
         "triangles": new[np.concatenate(fan)].T.tolist(),
-        "edges": new[_edges(faces) if len(faces) <= _MOST_EDGES else outline].tolist(),
+        # of many facets only the edges at which the surface bends
+        "edges": new[_edges(faces) if len(faces) <= 2_000 else outline].tolist(),
         "outline": new[outline].tolist(),
     }
 
@@ -261,9 +259,9 @@ def boundary_edges(outlines: Integers) -> Integers:
     return np.asarray(edges[first[count == 1]])
 
 
-def short_list(values: Any) -> Any:
+def short_list(values: ArrayLike) -> Any:
     """Numbers to seven digits, as lists; zeros lose their sign and integers their point."""
     array = np.asarray(values)
     if array.ndim > 1:
         return [short_list(row) for row in array]
-    return [int(x) if x == int(x) and abs(x) < 1e15 else float(f"{x:.{_DIGITS}g}") for x in array.tolist()]
+    return [int(x) if x == int(x) and abs(x) < 1e15 else float(f"{x:.7g}") for x in array.tolist()]

@@ -5,7 +5,7 @@ from __future__ import annotations
 import base64
 from html import escape
 from io import BytesIO
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -15,11 +15,9 @@ from enumsol.report.parts import Heading, Statement, filled_page, proof_commands
 from enumsol.support.messages import counted, html_table
 
 if TYPE_CHECKING:
-    from enumsol.loading.history import History
+    from matplotlib.figure import Figure
 
-#: Lines of the tree, and steps whose bodies are drawn, at most; of more steps the last ones.
-_TREE, _BODIES = 1000, 24
-_DPI = 96
+    from enumsol.loading.history import History
 
 
 def history_page(history: History, heading: Heading) -> str:
@@ -40,7 +38,7 @@ def history_page(history: History, heading: Heading) -> str:
     )
     words = {
         "steps": scrolling("Steps", html_table(*steps_table(history.data, units))),
-        "tree": escape("\n".join(tree_lines(history.data, _TREE))),
+        "tree": escape("\n".join(tree_lines(history.data, 1000))),
         "figures": _figures(history, units),
         "bodies": _bodies(history, units),
     }
@@ -71,7 +69,8 @@ def _figures(history: History, units: tuple[str, str] | None) -> str:
 def _bodies(history: History, units: tuple[str, str] | None) -> str:
     from enumsol.roots.body_plots import draw_bodies  # matplotlib comes with the first picture
 
-    shown = [number for number in range(1, len(history.steps) + 1) if history.nodes_of(number)][-_BODIES:]
+    # of many steps the last ones: a picture takes some ten thousand bytes
+    shown = [number for number in range(1, len(history.steps) + 1) if history.nodes_of(number)][-24:]
     pictures = {}
     for number in shown:
         try:
@@ -94,9 +93,9 @@ def _last(number: int, shown: list[int]) -> str:
     return " selected" if number == shown[-1] else ""
 
 
-def _image(figure: Any, words: str) -> str:
+def _image(figure: Figure, words: str) -> str:
     drawn = BytesIO()
-    figure.savefig(drawn, format="png", dpi=_DPI)
+    figure.savefig(drawn, format="png", dpi=96)
     text = base64.b64encode(drawn.getvalue()).decode()
     return f'<figure><img src="data:image/png;base64,{text}" alt="{escape(words)}"></figure>'
 

@@ -9,7 +9,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from html import escape
 from importlib.resources import files
 from string import Template
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple, cast
 
 import numpy as np
 
@@ -225,10 +225,10 @@ def given_section(scene: Scene | None, units: tuple[str, str] | None) -> str:
     )
 
 
-def _said(value: Any) -> str:
+def _said(value: object) -> str:
     """The value of an option, in words."""
     if isinstance(value, Mapping):
         return "; ".join(f"{part}: {_said(own)}" for part, own in value.items())
     if isinstance(value, (list, tuple, np.ndarray)):
         return ", ".join(_said(own) for own in value)
-    return str(value) if isinstance(value, str) or value is None else f"{float(value):.10g}"
+    return str(value) if isinstance(value, str) or value is None else f"{float(cast('float', value)):.10g}"

@@ -28,11 +28,15 @@ from enumsol.roots.root import summary
 from enumsol.support.messages import counted, found_of
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Callable, Sequence
 
     from enumsol.fem import Scene
     from enumsol.roots.root import Root
-    from enumsol.roots.root_set import RootSet, Undecided
+    from enumsol.roots.root_set import RootSet
+    from enumsol.support.array_types import Floats
+
+    #: Columns of a table by their headings: the cells, of the number of an item and the item.
+    _Columns = dict[str, Callable[[int, Any], str]]
 
 #: Rows of the tables of roots, continua and undecided parts.
 _MOST_ROWS = 500
@@ -109,60 +113,61 @@ def _root_facts(found: RootSet, units: tuple[str, str] | None) -> list[tuple[str
 def _root_table(found: RootSet) -> str:
     if not len(found):
         return "<p>No isolated solution was found.</p>"
-    heads = ["root", "index", "regular", "margin", "max lambda_n", "statuses, node by node"]
-    rows = []
-    for k, root in enumerate(found[:_MOST_ROWS]):
-        cells = [str(k), _signed(root.index), "yes" if root.regular else "no", f"{root.margin:.2e}"]
-        cells += [f"{np.max(root.lambda_n):.6g}", summary(root.statuses)]
-        rows.append((f' data-root="{k}" tabindex="0"', cells))
-    return table_text("All roots", heads, rows) + _more(len(found), "roots")
+    columns: _Columns = {
+        "root": lambda k, _: str(k),
+        "index": lambda _, root: _signed(root.index),
+        "regular": lambda _, root: "yes" if root.regular else "no",
+        "margin": lambda _, root: f"{root.margin:.2e}",
+        "max lambda_n": lambda _, root: f"{np.max(root.lambda_n):.6g}",
+        "statuses, node by node": lambda _, root: summary(root.statuses),
+    }
+    return _table("All roots", "roots", found, columns, ' data-root="{}" tabindex="0"')
 
 
 def _family_table(found: RootSet) -> str:
     if not found.families:
         return ""
-    rows = [
-        ("", [
-            str(k), str(family.dimension), _signed(family.index), str(len(family.polytopes)), str(len(family.vertices)),
-            f"{np.min(family.vertices[..., 0]):.6g} to {np.max(family.vertices[..., 0]):.6g}",
-            "; ".join(summary(part.statuses) for part in family.polytopes[:6]),
-        ])
-        for k, family in enumerate(found.families[:_MOST_ROWS])
-    ]  # fmt: skip
-    heads = ("continuum", "dimension", "index", "polytopes", "vertices", "lambda_n", "statuses, node by node")
+    columns: _Columns = {
+        "continuum": lambda k, _: str(k),
+        "dimension": lambda _, family: str(family.dimension),
+        "index": lambda _, family: _signed(family.index),
+        "polytopes": lambda _, family: str(len(family.polytopes)),
+        "vertices": lambda _, family: str(len(family.vertices)),
+        "lambda_n": lambda _, family: _span(family.vertices[..., 0], 6),
+        "statuses, node by node": lambda _, family: "; ".join(summary(part.statuses) for part in family.polytopes[:6]),
+    }
     words = "<p>Connected sets of infinitely many solutions. They are not drawn.</p>"
-    table = table_text("Continua", heads, rows) + _more(len(found.families), "continua")
+    table = _table("Continua", "continua", found.families, columns)
     return f"<section><h2>Continua</h2>{words}{table}</section>"
 
 
 def _undecided_table(found: RootSet) -> str:
     if not found.undecided:
         return ""
-    rows = [("", _undecided_cells(k, item)) for k, item in enumerate(found.undecided[:_MOST_ROWS])]
-    heads = (
-        "part",
-        "what is known of the nodes",
-        "leaves",
-        "max lambda_n of a root in it",
-        "why it is open",
-        "what may help",
-    )
+    columns: _Columns = {
+        "part": lambda k, _: str(k),
+        "what is known of the nodes": lambda _, item: summary(item.statuses),
+        "leaves": lambda _, item: str(item.leaves),
+        "max lambda_n of a root in it": lambda _, item: (
+            "not known" if item.bounds is None else _span(np.max(item.bounds.lambda_n, axis=0), 5)
+        ),
+        "why it is open": lambda _, item: item.reason,
+        "what may help": lambda _, item: item.hint,
+    }
     words = "<p>Parts of the search without an answer: each may hold solutions or none.</p>"
-    more = _more(len(found.undecided), "parts")
-    table = table_text("Undecided parts", heads, rows)
-    return f'<section id="undecided"><h2>Undecided</h2>{words}{table}{more}</section>'
+    table = _table("Undecided parts", "parts", found.undecided, columns)
+    return f'<section id="undecided"><h2>Undecided</h2>{words}{table}</section>'
 
 
-def _undecided_cells(k: int, item: Undecided) -> list[str]:
-    bounds = "not known"
-    if item.bounds is not None:
-        low, high = np.max(item.bounds.lambda_n, axis=0)
-        bounds = f"{low:.5g} to {high:.5g}"
-    return [str(k), summary(item.statuses), str(item.leaves), bounds, item.reason, item.hint]
+def _table(caption: str, what: str, items: Sequence[Any], columns: _Columns, kept: str = "") -> str:
+    """A table of items, of many the first, with the attributes ``kept`` of their rows."""
+    rows = [(kept.format(k), [of(k, item) for of in columns.values()]) for k, item in enumerate(items[:_MOST_ROWS])]
+    more = f"<p>and {len(items) - _MOST_ROWS} more {what}</p>" if len(items) > _MOST_ROWS else ""
+    return table_text(caption, columns, rows) + more
 
 
-def _more(count: int, what: str) -> str:
-    return f"<p>and {count - _MOST_ROWS} more {what}</p>" if count > _MOST_ROWS else ""
+def _span(values: Floats, digits: int) -> str:
+    return f"{np.min(values):.{digits}g} to {np.max(values):.{digits}g}"
 
 
 def _signed(index: int | None) -> str:

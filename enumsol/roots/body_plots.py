@@ -26,7 +26,12 @@ from enumsol.support.plotting import axes_of, axes_or_none, figure_of, in_units,
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+    from mpl_toolkits.mplot3d import Axes3D
+
     from enumsol.model.problem3d import AnyProblem, ContactProblem3D
+    from enumsol.roots.local_branch import ContactState
     from enumsol.support.array_types import Floats, Indices
 
 
@@ -40,19 +45,21 @@ MARKS = {
 }
 _FORCE, _SLIP, _BODY, _EDGE, _BEFORE = "#b3202c", "#0a7d7a", "#dfe6ee", "#8796a8", "#dcdcdc"
 _BEFORE_IN_SPACE, _BEFORE_LINE = "#5b6672", {"linewidths": 0.8, "linestyles": "dashed"}
-#: Length of an arrow along a slip on the contact surface, whatever the slip, as a part of its size.
-_LONG = 0.15
+#: Arrows in the plane, by default as long as they are.
+_ARROW: dict[str, Any] = {"angles": "xy", "scale_units": "xy", "scale": 1.0, "width": 0.006, "zorder": 4}
 #: Points between a title and what is below it, by dimension: seen from below, axes of a solid stand on top.
 _PAD = {2: 6.0, 3: 18.0}
-#: Bodies side by side, and how many are drawn at most.
-_ACROSS, MOST_BODIES = 3, 12
 
 
 def draw_body(
-    root: Any, problem: AnyProblem, ax: Any = None, scale: float | None = None, units: tuple[str, str] | None = None
+    root: ContactState,
+    problem: AnyProblem,
+    place: object = None,
+    scale: float | None = None,
+    units: tuple[str, str] | None = None,
 ) -> Any:
     """A figure of one deformed body; see Root.plot_body."""
-    axes_or_none(ax)
+    ax = axes_or_none(place)
     shape = body_shape(problem)
     (factor,), arrows = _factors([root], problem, shape, scale)
     if ax is None:
@@ -77,9 +84,9 @@ def draw_bodies(roots: Sequence[Any], scale: float | None = None, units: tuple[s
         raise InvalidArgumentError("there are no isolated roots to draw; expected at least one")
     problem = roots[0].problem
     shape = body_shape(problem)
-    drawn = roots[:MOST_BODIES]
+    drawn = roots[:12]
     factors, arrows = _factors(drawn, problem, shape, scale)
-    across = min(_ACROSS, len(drawn))
+    across = min(3, len(drawn))
     rows = -(-len(drawn) // across)
     figure = new_figure(figsize=(4.0 * across, 3.6 * rows + 0.8))
     one_scale = len(set(factors)) == 1
@@ -106,7 +113,7 @@ def _scale_words(scale: float) -> str:
     return f"displacements times {scale:g}"
 
 
-def _strongest(roots: Sequence[Any], problem: AnyProblem, shape: BodyShape) -> float:
+def _strongest(roots: Sequence[ContactState], problem: AnyProblem, shape: BodyShape) -> float:
     """The largest nodal contact force of several roots [force]."""
     return max(largest_length(shape.contact_forces(problem, root.lambda_n, root.lambda_t)) for root in roots)
 
@@ -122,22 +129,24 @@ def _factors(
     return own_scales(moved, shape.size), arrows
 
 
-def _axes(figure: Any, place: tuple[int, int, int], shape: BodyShape) -> Any:
+def _axes(figure: Figure, place: tuple[int, int, int], shape: BodyShape) -> Any:
     return figure.add_subplot(*place, projection="3d" if shape.points.shape[1] == 3 else None)
 
 
-def _draw(ax: Any, root: Any, problem: AnyProblem, shape: BodyShape, scale: float, arrows: float) -> None:
+def _draw(ax: Axes3D, root: Any, problem: AnyProblem, shape: BodyShape, scale: float, arrows: float) -> None:
     moves = scale * shape.moves(root.problem, root.u, root.alpha)
     points = shape.points + moves
     places = shape.at_rows(points)
     forces = arrows * shape.contact_forces(problem, root.lambda_n, root.lambda_t)
     pressed = np.flatnonzero(np.any(forces != 0, axis=1))
-    if points.shape[1] == 2:
+    plane = points.shape[1] == 2
+    if len(pressed):
+        # the arrow ends at the node that it acts on
+        look = _ARROW if plane else {"linewidth": 1.8, "arrow_length_ratio": 0.3, "zorder": 4}
+        ax.quiver(*(points - forces)[pressed].T, *forces[pressed].T, color=_FORCE, **look)
+    if plane:
         _plane(ax, shape, points)
         if len(pressed):
-            # the arrow ends at the node that it acts on
-            options = {"angles": "xy", "scale_units": "xy", "scale": 1.0, "width": 0.006, "zorder": 4}
-            ax.quiver(*(points - forces)[pressed].T, *forces[pressed].T, color=_FORCE, **options)
             ax.update_datalim((points - forces)[pressed])
         ax.set_aspect("equal", adjustable="datalim")
         ax.margins(0.08)
@@ -145,14 +154,10 @@ def _draw(ax: Any, root: Any, problem: AnyProblem, shape: BodyShape, scale: floa
         _solid(ax, shape, points)
         x, y, z = first_view(row_frames(problem)[:, 0])
         ax.view_init(elev=np.degrees(np.arcsin(z)), azim=np.degrees(np.arctan2(y, x)))
-        if len(pressed):
-            options = {"linewidth": 1.8, "arrow_length_ratio": 0.3, "zorder": 4}
-            ax.quiver(*(points - forces)[pressed].T, *forces[pressed].T, color=_FORCE, **options)
         slides, ways = slip_directions(problem, root.u_t, root.statuses)
         if len(slides):
-            length = SLIP_ARROW * shape.size
-            options = {"linewidth": 1.8, "arrow_length_ratio": 0.4, "zorder": 4}
-            ax.quiver(*places[slides].T, *(length * ways).T, color=_SLIP, **options)
+            look = {"linewidth": 1.8, "arrow_length_ratio": 0.4, "zorder": 4}
+            ax.quiver(*places[slides].T, *(SLIP_ARROW * shape.size * ways).T, color=_SLIP, **look)
         ax.auto_scale_xyz(*np.concatenate([shape.points, points, (points - forces)[pressed]]).T)
         ax.locator_params(nbins=4)
         ax.tick_params(labelsize=7, pad=0)
@@ -173,7 +178,7 @@ def _same_view(axes: Sequence[Any]) -> None:
         ax.set_aspect("equal")
 
 
-def _plane(ax: Any, shape: BodyShape, points: Floats) -> None:
+def _plane(ax: Axes, shape: BodyShape, points: Floats) -> None:
     from matplotlib.collections import PolyCollection
 
     cells = shape.cells[:, KINDS[2, shape.cells.shape[1]].outline]
@@ -183,7 +188,7 @@ def _plane(ax: Any, shape: BodyShape, points: Floats) -> None:
         ax.update_datalim(positions)
 
 
-def _solid(ax: Any, shape: BodyShape, points: Floats) -> None:
+def _solid(ax: Axes3D, shape: BodyShape, points: Floats) -> None:
     from mpl_toolkits.mplot3d.art3d import Line3DCollection, Poly3DCollection
 
     faces = facet_outlines(boundary_facets(3, shape.cells))
@@ -200,7 +205,9 @@ def _name_axes(ax: object, dimension: int, units: tuple[str, str] | None) -> Non
         getattr(ax, f"set_{direction}label")(in_units(direction, "length", units), fontsize=8)
 
 
-def _legend(place: Any, roots: Sequence[Any], strongest: float, units: tuple[str, str] | None) -> None:
+def _legend(
+    place: Axes | Figure, roots: Sequence[ContactState], strongest: float, units: tuple[str, str] | None
+) -> None:
     found = {status for root in roots for status in root.statuses}
     handles = [
         line_entry(status.value, linestyle="", marker=marker, markerfacecolor=face, markeredgecolor="black")
@@ -222,7 +229,7 @@ def _legend(place: Any, roots: Sequence[Any], strongest: float, units: tuple[str
     place.legend(handles=handles, fontsize=8, frameon=False, **where)
 
 
-def draw_root(root: Any, problem: ContactProblem3D, ax: object, units: tuple[str, str] | None = None) -> Any:
+def draw_root(root: ContactState, problem: ContactProblem3D, ax: object, units: tuple[str, str] | None = None) -> Any:
     """See Root.plot."""
     if axes_or_none(ax) is not None or problem.mesh is None:
         return draw_slips(root, problem, ax, units)
@@ -232,7 +239,9 @@ def draw_root(root: Any, problem: ContactProblem3D, ax: object, units: tuple[str
     return figure
 
 
-def draw_slips(root: Any, problem: ContactProblem3D, ax: Any, units: tuple[str, str] | None = None) -> Any:
+def draw_slips(
+    root: ContactState, problem: ContactProblem3D, place: object, units: tuple[str, str] | None = None
+) -> Any:
     """Statuses and directions of slip on the contact surface."""
     if problem.coordinates is None:
         raise InvalidArgumentError("the problem has no coordinates; expected a problem made with coordinates=")
@@ -240,7 +249,7 @@ def draw_slips(root: Any, problem: ContactProblem3D, ax: Any, units: tuple[str, 
     # the two coordinate axes along which the contact surface extends most
     shown = np.sort(np.argsort(np.ptp(places, axis=0), kind="stable")[1:])
     moves = np.einsum("pk,pkc->pc", root.u_t, _tangents(problem, shown))[:, shown]
-    ax = axes_of(ax, (6.4, 5.0))
+    ax = axes_of(place, (6.4, 5.0))
     for status, (marker, face) in MARKS.items():
         at = places[[found is status for found in root.statuses]][:, shown]
         if len(at):
@@ -249,17 +258,18 @@ def draw_slips(root: Any, problem: ContactProblem3D, ax: Any, units: tuple[str, 
     slides = np.array([found is ContactStatus.SLIP for found in root.statuses]) & (size > 0)
     if np.any(slides):
         begin, d = places[slides][:, shown], moves[slides] / size[slides, None]
-        length = _LONG * float(np.max(np.ptp(places, axis=0))) or 1.0
-        options = {"angles": "xy", "scale_units": "xy", "scale": 1 / length, "width": 0.009, "zorder": 4}
+        # arrows of one length, whatever the slip
+        length = 0.15 * float(np.max(np.ptp(places, axis=0))) or 1.0
+        look = _ARROW | {"scale": 1 / length, "width": 0.009}
         low, high = np.min(size[slides]), np.max(size[slides])
         said = f"{low:.3g}" if np.isclose(low, high) else f"{low:.3g} to {high:.3g}"
-        ax.quiver(*begin.T, *d.T, color=_SLIP, label=f"direction of slip ({said})", **options)
+        ax.quiver(*begin.T, *d.T, color=_SLIP, label=f"direction of slip ({said})", **look)
         ax.update_datalim(begin + length * d)
     ax.set_aspect("equal", adjustable="box")
     ax.margins(0.15)
     ax.set_xlabel(in_units("xyz"[shown[0]], "length", units))
     ax.set_ylabel(in_units("xyz"[shown[1]], "length", units))
-    ax.set_title(f"directions of slip at alpha = {float(root.alpha):g}, index {root.index:+d}")
+    ax.set_title(f"directions of slip at alpha = {float(root.alpha):g}, {_index(root)}")
     ax.legend(loc="upper left", bbox_to_anchor=(1.02, 1.0), fontsize=8, frameon=False)
     return figure_of(ax)
 

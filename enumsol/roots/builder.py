@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, cast
 
 import numpy as np
 
@@ -30,7 +30,8 @@ if TYPE_CHECKING:
     from enumsol.roots.components import RootComponent
     from enumsol.search.certifiers.protocol import UndecidedPart
     from enumsol.selections.float_selections import FloatSelections
-    from enumsol.selections.solution import PointValues, SelectionSolution, SelectionSolver
+    from enumsol.selections.rational_selections import ExactSelections
+    from enumsol.selections.solution import SelectionSolution, SelectionSolver
     from enumsol.support.array_types import Alpha, Codes, Floats
     from enumsol.trusted.at_alpha import VerifiedSelection
 
@@ -51,7 +52,7 @@ class RootBuilder:
 
     problem: ContactProblem
     alpha: Alpha
-    points: PointValues
+    points: SelectionSolver
     floats: FloatSelections
     verified: Mapping[Codes, VerifiedSelection]
     rigid_unit: Floats | None = None
@@ -95,7 +96,7 @@ class RootBuilder:
             return None
         ball = self.verified.get(solution.codes)
         if ball is None or ball.rigid is None:
-            return rigid_of(self.points, solution.vertices[0])
+            return np.asarray(cast("ExactSelections", self.points).rigid(solution.vertices[0]) + 0.0)
         # -0.0 prints badly
         return np.asarray(ball.rigid.mid * self.rigid_unit + 0.0)
 
@@ -169,21 +170,12 @@ def polytope(solution: SelectionSolution, corners: Sequence[Any], solver: Select
     points = np.array([solver.forces(corner) for corner in corners])
     slips = [solver.slip_signs(vertex) for vertex in solution.vertices]
     statuses = tuple(contact_status(code, sign_over(s[i] for s in slips)) for i, code in enumerate(solution.codes))
-    rigid = np.array([rigid_of(solver, corner) for corner in corners]) if modes_of(solver) else None
+    exact = cast("ExactSelections", solver)  # which alone has rigid displacements
+    rigid = np.array([exact.rigid(corner) + 0.0 for corner in corners]) if getattr(solver, "modes", 0) else None
     order = np.lexsort((points if rigid is None else np.hstack([points, rigid])).T[::-1])
     points = points[order]
     vertices = np.stack([points[:, : solver.p], points[:, solver.p :]], axis=2)
     return Polytope(statuses, vertices, solution.dimension, None if rigid is None else rigid[order])
-
-
-def modes_of(solver: PointValues) -> int:
-    """Rigid modes of the body whose points a solver has."""
-    return getattr(solver, "modes", 0)
-
-
-def rigid_of(solver: Any, point: Any) -> Floats:
-    """Coordinates of the rigid displacement at a point."""
-    return np.asarray(solver.rigid(point) + 0.0)
 
 
 def in_order(roots: list[Root], families: list[RootFamily]) -> tuple[list[Root], list[RootFamily]]:

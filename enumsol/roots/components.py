@@ -34,7 +34,6 @@ if TYPE_CHECKING:
 #: Selections examined around one degenerate root or family to find all that hold there; beyond, a search on the
 #: perturbed problem gives the index.
 MAX_LOCAL_SELECTIONS = 256
-_DIRECTION_SEEDS = (20121, 20122, 20123, 20124)
 
 
 @dataclass(frozen=True)
@@ -225,7 +224,7 @@ def _maximal(group: list[SelectionSolution], solver: SelectionSolver) -> list[Se
 def _index(group: list[SelectionSolution], solver: SelectionSolver) -> int | None:
     """Sum of sign det over the regular selections whose root survives; two generic directions must agree."""
     found: list[int] = []
-    for seed in _DIRECTION_SEEDS:
+    for seed in (20121, 20122, 20123, 20124):
         direction = np.random.default_rng(seed).integers(-1000, 1001, size=2 * solver.p)
         total = 0
         for solution in group:

@@ -4,15 +4,11 @@ from __future__ import annotations
 
 import math
 import time
-from fractions import Fraction
 from typing import TYPE_CHECKING, Any, Literal
-
-import numpy as np
 
 from enumsol.errors import InvalidArgumentError
 from enumsol.model.contact_body import ContactBody
 from enumsol.model.problem import ContactProblem
-from enumsol.model.statuses import FINAL, OPEN
 from enumsol.roots.builder import RootBuilder, in_order, named, root_family
 from enumsol.roots.components import RootComponent, apart, closed_component, connected_components
 from enumsol.roots.enumeration import Enumeration, not_begun
@@ -22,10 +18,9 @@ from enumsol.search.exhaustive import BLOCK, exhaustive_exact, exhaustive_float
 from enumsol.search.outcome import SearchLimits, SearchProgress, Stop, StopReason
 from enumsol.search.solvers import Arithmetic, Solvers
 from enumsol.selections.float_selections import SIGN_TOLERANCE
-from enumsol.selections.solution import PointValues, SelectionSolution, SelectionSolver
+from enumsol.selections.solution import SelectionSolution, SelectionSolver
 from enumsol.support import arguments
-from enumsol.support.deadlines import Deadline, TimeOverError, within
-from enumsol.support.keeping import keeping
+from enumsol.support.deadlines import Deadline, TimeOverError, keeping, within
 from enumsol.support.messages import counted
 from enumsol.support.workers import workers_of
 
@@ -38,58 +33,11 @@ if TYPE_CHECKING:
 
     from enumsol.model.problem3d import AnyProblem, ContactProblem3D
     from enumsol.roots.root import Root, RootFamily
-    from enumsol.support.array_types import Alpha, AlphaLike, Codes, Floats
-    from enumsol.support.keeping import Ending
-
-
-class AtRest:
-    """The one root of a body with g = 0, at which every selection holds, and its values (PointValues).
-
-    The energy bound is lambda' S lambda <= 0 there, so that lambda = 0; its degree is that of all roots, +1.
-
-    Parameters
-    ----------
-    F_positive : tuple of p bool
-    proven : bool
-        g = 0 holds in the data and not only as computed in floats.
-    """
-
-    def __init__(self, F_positive: tuple[bool, ...], *, proven: bool) -> None:
-        self._F_positive, self._p, self._proven = F_positive, len(F_positive), proven
-
-    @property
-    def component(self) -> RootComponent:
-        """The root."""
-        solution = SelectionSolution((OPEN,) * self._p, (np.zeros(2 * self._p),), 0, 0, strict=False)
-        active = tuple(frozenset(FINAL[positive]) for positive in self._F_positive)
-        return RootComponent((solution,), active, 0, 1, whole=True)
-
-    def forces(self, point: object) -> Floats:
-        """Zeros."""
-        del point
-        return np.zeros(2 * self._p)
-
-    displacements = forces
-
-    def slip_signs(self, point: object) -> tuple[int, ...]:
-        """Zeros."""
-        del point
-        return (0,) * self._p
-
-    def exact_slips(self, point: object) -> tuple[Fraction, ...]:
-        """Zeros."""
-        del point
-        return (Fraction(0),) * self._p
-
-    def bounds(self, point: object) -> tuple[Floats, Floats] | None:
-        """Zeros where they are proven."""
-        del point
-        return (np.zeros(4 * self._p), np.zeros(4 * self._p)) if self._proven else None
+    from enumsol.support.array_types import Alpha, AlphaLike, Codes
+    from enumsol.support.deadlines import Ending
 
 
 Method = Literal["tree", "exhaustive"]
-#: The exhaustive method reports progress this often [seconds].
-_REPORT_SECONDS = 0.1
 
 
 def enumerate_roots(
@@ -191,7 +139,8 @@ def enumerate_roots(
     seconds, tolerance = arguments.optional_seconds(time_limit), arguments.share(tolerance)
     if _is_in_space(problem):
         # not for problems in 2D
-        from enumsol.roots.space_roots import SpaceEnumeration, check_supported, solvers_in_space
+        from enumsol.roots.space_roots import SpaceEnumeration, check_supported
+        from enumsol.search.space.space_setup import SpaceSolvers
 
         check_supported(arithmetic, method, engine)
     _check_proof(arithmetic, method, proof_path, resume)
@@ -205,12 +154,11 @@ def enumerate_roots(
         try:
             with within(Deadline.after(started, seconds)):
                 if _is_in_space(problem):
-                    in_space = solvers_in_space(problem, value, arithmetic)
+                    in_space = SpaceSolvers(problem, value, arithmetic)
                     _ = in_space.enclosed  # before a file is begun
                     search = SpaceEnumeration(in_space, progress, proof_path, resumed=resume, started=started)
                 else:
-                    kind = Solvers if problem.held else _floating_solvers()
-                    solvers = kind(problem, value, arithmetic, tolerance, engine)
+                    solvers = Solvers(problem, value, arithmetic, tolerance, engine)
                     _ = solvers.enclosed  # as above
                     search = _Enumeration(solvers, progress, proof_path, method=method, resumed=resume, started=started)
         except TimeOverError:
@@ -262,12 +210,6 @@ def is_unique(problem: AnyProblem, alpha: AlphaLike, **options: Any) -> bool | N
 def _is_in_space(problem: object) -> TypeIs[ContactProblem3D]:
     """True if it is a problem in 3D, whose class is not loaded for others."""
     return isinstance(problem, ContactBody) and not isinstance(problem, ContactProblem)
-
-
-def _floating_solvers() -> type[Solvers]:
-    from enumsol.search.floating_solvers import FloatingSolvers  # for bodies that nothing holds only
-
-    return FloatingSolvers
 
 
 def _in_doubt(core: Codes) -> UndecidedPart:
@@ -326,7 +268,7 @@ class _Enumeration(Enumeration[Solvers]):
             if solution is not None:
                 outcome.solutions.append(solution)
             now = time.perf_counter()
-            due = now - reported > _REPORT_SECONDS or (solution is None and outcome.selections % BLOCK == 0)
+            due = now - reported > 0.1 or (solution is None and outcome.selections % BLOCK == 0)
             if self.progress is not None and (due or outcome.selections == total):
                 reported = now
                 share = outcome.selections / total
@@ -373,7 +315,7 @@ class _Enumeration(Enumeration[Solvers]):
             parts.append((connected_components(exact, self.solvers.exact, perturbed), self.solvers.exact))
         return parts
 
-    def _root(self, component: RootComponent, values: PointValues) -> Root:
+    def _root(self, component: RootComponent, values: SelectionSolver) -> Root:
         solvers, verified = self.solvers, self.certifier.certified.verified
         about = self.problem, self.alpha, values, solvers.floats, verified, solvers.rigid_unit
         return RootBuilder(*about).root(component)
@@ -384,8 +326,7 @@ class _Enumeration(Enumeration[Solvers]):
         families: list[RootFamily] = []
         separate, joinable = 0, False
         if self.unloaded:
-            at_rest = AtRest(solvers.floats.F_positive, proven=self.arithmetic != "fast")
-            roots, separate = [self._root(at_rest.component, at_rest)], 1
+            roots, separate = [self._rest()], 1
         for components, solver in self._joined():
             # what joins a component that was not examined whole is not known
             separate += sum(c.whole for c in components)
@@ -411,8 +352,7 @@ def roots_of_selections(problem: ContactProblem, alpha: Alpha, selections: Seque
     selections : codes of complete selections
     whole : no others hold
     """
-    kind = Solvers if problem.held else _floating_solvers()
-    solvers = kind(problem, alpha, "verified", SIGN_TOLERANCE)
+    solvers = Solvers(problem, alpha, "verified", SIGN_TOLERANCE)
     return _Selected(solvers, None, None, method="graph").select(selections, whole=whole)
 
 

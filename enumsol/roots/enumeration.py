@@ -5,12 +5,18 @@ from __future__ import annotations
 import time
 from abc import ABC, abstractmethod
 from dataclasses import fields
+from fractions import Fraction
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Generic, TypeVar
 
+import numpy as np
+
+from enumsol.condensation.condensed import condensation_of
 from enumsol.errors import OutputError
+from enumsol.model.statuses import STATUSES, ContactStatus
 from enumsol.proof.begun import BegunProof, begun_proof
 from enumsol.proof.writer import ProofWriter
+from enumsol.roots.root import Enclosure, Root
 from enumsol.roots.root_set import RigidBound, RootSet, SearchStats, Undecided
 from enumsol.search.certifiers.protocol import UndecidedPart
 from enumsol.search.outcome import AWAY, HOLD, SearchLimits, SearchOutcome, SearchProgress, Stop, StopReason
@@ -25,10 +31,10 @@ if TYPE_CHECKING:
 
     from enumsol.model.contact_body import ContactBody
     from enumsol.proof.proof_file import Proof
-    from enumsol.roots.root import Root, RootFamily
+    from enumsol.roots.root import RootFamily
     from enumsol.search.tree import TreeSearch
     from enumsol.support.array_types import Alpha, Codes
-    from enumsol.support.keeping import Ending
+    from enumsol.support.deadlines import Ending
 
 _Solvers = TypeVar("_Solvers", bound=SearchSetup)
 
@@ -181,6 +187,32 @@ class Enumeration(ABC, Generic[_Solvers]):
             certified_data=certified_data,
             proof=self._proof(**counts),
             rigid_bound=None if modes.r == 0 else RigidBound(self.problem.rigid_reach, needed, beyond),
+        )
+
+    def _rest(self) -> Root:
+        """The unloaded body: nothing moves, every status holds, and the index is that of all roots together.
+
+        The energy bound is lambda' S lambda <= 0 there, so that lambda = 0.
+        """
+        p, normal, tangential = self.problem.p, np.zeros(self.problem.p), np.zeros(self.problem.slip_offset.shape)
+        plane = tangential.ndim == 1
+        return Root(
+            alpha=self.alpha,
+            statuses=(ContactStatus.OPEN,) * p,
+            active=(frozenset(STATUSES if plane else (*STATUSES[:2], ContactStatus.SLIP)),) * p,
+            lambda_n=normal,
+            lambda_t=tangential,
+            u_n=normal,
+            u_t=tangential,
+            slip_angle=None if plane else np.full(tangential.shape, np.nan),
+            index=1,
+            regular=False,
+            margin=0.0,
+            enclosure=Enclosure(*(np.zeros((*part.shape, 2)) for part in (normal, tangential) * 2))
+            if self.arithmetic != "fast"
+            else None,
+            _condensed=condensation_of(self.problem),
+            _exact_slips=(Fraction(0),) * p if plane else None,
         )
 
     def _stats(self) -> SearchStats:

@@ -26,9 +26,6 @@ if TYPE_CHECKING:
     from enumsol.selections.solution import ActiveSets
     from enumsol.support.array_types import Alpha, Codes, Floats, Indices
 
-#: A node of which nothing is known but that it moves less than this, by the largest displacement, may stick.
-_STILL = 1e-9
-
 
 @dataclass(frozen=True)
 class SelectionTangent(Sealed):
@@ -121,7 +118,8 @@ class SelectionTangent(Sealed):
             without = bool(np.any(~held & (dF != 0)))
             return None if without else (t[held], matrix[t[held]], g1[t[held]])
         if not np.any(held):
-            still = np.linalg.norm(w[dF != 0]) <= _STILL * np.max(np.abs(self.w / scale))
+            # it may stick if it is known to move less than this, by the largest displacement
+            still = np.linalg.norm(w[dF != 0]) <= 1e-9 * np.max(np.abs(self.w / scale))
             return None if still and np.any(dF != 0) else (t, J, n * dF * _unit(np.abs(dF) * w))
         if len(F) == 1:
             d, across = np.array([-1.0 if code == SLIP_MINUS else 1.0]), np.zeros((1, 1))

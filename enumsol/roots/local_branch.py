@@ -6,7 +6,7 @@ from collections.abc import Sequence, Set
 from dataclasses import dataclass
 from itertools import product
 from math import prod
-from typing import TYPE_CHECKING, Any, Protocol
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -29,6 +29,7 @@ from enumsol.support.immutable import Sealed
 from enumsol.support.messages import counted
 
 if TYPE_CHECKING:
+    from enumsol.condensation.condensed import CondensedProblem
     from enumsol.model.problem3d import AnyProblem
 
 
@@ -41,24 +42,30 @@ LOCATED_SINGULAR_TOLERANCE = 1e-8
 _CODES = {**{status: code for code, status in enumerate(STATUSES)}, ContactStatus.SLIP: SLIP}
 
 
-class SolutionPoint(Protocol):
-    """What the test needs of a root: its alpha, the statuses that hold at every node, lambda_t and u_t."""
+@dataclass(frozen=True, eq=False, kw_only=True)
+class ContactState(Sealed):
+    """Statuses, forces and displacements of all contact nodes at a solution.
 
-    @property
-    def alpha(self) -> Alpha:
-        """The parameter."""
+    Attributes
+    ----------
+    alpha : float or Fraction
+    statuses : tuple of p ContactStatus
+        Where several hold, the first of OPEN, STICK, SLIP_PLUS, SLIP_MINUS; in 3D of OPEN, STICK, SLIP.
+    active : tuple of p frozensets of ContactStatus
+        All statuses that hold at the node.
+    lambda_n, lambda_t : (p,) arrays; in 3D lambda_t is (p, 2), along the local axes
+        Contact forces on the nodes (nodal forces, not pressures) [force].
+    u_n, u_t : arrays of the same shapes
+        Bn u - gap <= 0 and Bt u - slip_offset [length].
+    """
 
-    @property
-    def active(self) -> Sequence[Set[ContactStatus]]:
-        """All statuses that hold, node by node."""
-
-    @property
-    def lambda_t(self) -> Floats:
-        """Tangential forces, shape (p,), in 3D (p, 2)."""
-
-    @property
-    def u_t(self) -> Floats:
-        """Tangential displacements, of the same shape."""
+    alpha: Alpha
+    statuses: tuple[ContactStatus, ...]
+    active: tuple[frozenset[ContactStatus], ...]
+    lambda_n: Floats
+    lambda_t: Floats
+    u_n: Floats
+    u_t: Floats
 
 
 @dataclass(frozen=True)
@@ -103,7 +110,7 @@ class LocalBranchTest:
         return f"{answer} in the load ({detail}){premise}"
 
 
-def local_branch_test(problem: AnyProblem, root: SolutionPoint) -> LocalBranchTest:
+def local_branch_test(problem: AnyProblem, root: ContactState) -> LocalBranchTest:
     """Test of the existence of a local Lipschitz branch of solutions through a root (theory, section 3.2).
 
     The test looks at the normal map G(z) = w + S lambda, which does not depend on the parameter r of H, over the
@@ -144,12 +151,12 @@ def local_branch_test(problem: AnyProblem, root: SolutionPoint) -> LocalBranchTe
     dimension = 2 if isinstance(problem, ContactProblem) else 3
     if np.ndim(root.u_t) != dimension - 1:
         raise InvalidArgumentError(f"root is one in {5 - dimension}D; expected one in {dimension}D, as is the problem")
-    return branch_test(condensation_of(problem), root)
+    return branch_test(condensation_of(problem), problem.affine_friction, root)
 
 
-def branch_test(condensed: Any, root: SolutionPoint) -> LocalBranchTest:
-    """The test at a root of a condensation; see local_branch_test."""
-    alpha, (F0, F1) = float(root.alpha), condensed.problem.affine_friction
+def branch_test(condensed: CondensedProblem, friction: tuple[Floats, Floats], root: ContactState) -> LocalBranchTest:
+    """The test at a root, from F at alpha = 0 and its slope; see local_branch_test."""
+    alpha, (F0, F1) = float(root.alpha), friction
     frictionless = (F0 == 0) & (F1 == 0)
     frictionless = frictionless if frictionless.ndim == 1 else np.all(frictionless, axis=1)
     active = []

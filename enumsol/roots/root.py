@@ -10,7 +10,7 @@ import numpy as np
 
 from enumsol.errors import InvalidArgumentError
 from enumsol.model.statuses import ContactStatus, sign_array
-from enumsol.roots.local_branch import LocalBranchTest, branch_test
+from enumsol.roots.local_branch import ContactState, LocalBranchTest, branch_test
 from enumsol.support.immutable import Sealed, sealed
 from enumsol.support.messages import html_lines, html_table, visible
 from enumsol.support.plotting import checked_units, kept
@@ -55,32 +55,6 @@ class Enclosure(Sealed):
     u_n: Floats
     u_t: Floats
     rigid_coordinates: Floats | None = None
-
-
-@dataclass(frozen=True, eq=False, kw_only=True)
-class ContactState(Sealed):
-    """Statuses, forces and displacements of all contact nodes at a solution.
-
-    Attributes
-    ----------
-    alpha : float or Fraction
-    statuses : tuple of p ContactStatus
-        Where several hold, the first of OPEN, STICK, SLIP_PLUS, SLIP_MINUS; in 3D of OPEN, STICK, SLIP.
-    active : tuple of p frozensets of ContactStatus
-        All statuses that hold at the node.
-    lambda_n, lambda_t : (p,) arrays; in 3D lambda_t is (p, 2), along the local axes
-        Contact forces on the nodes (nodal forces, not pressures) [force].
-    u_n, u_t : arrays of the same shapes
-        Bn u - gap <= 0 and Bt u - slip_offset [length].
-    """
-
-    alpha: Alpha
-    statuses: tuple[ContactStatus, ...]
-    active: tuple[frozenset[ContactStatus], ...]
-    lambda_n: Floats
-    lambda_t: Floats
-    u_n: Floats
-    u_t: Floats
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -202,7 +176,7 @@ class Root(ContactState):
         InvalidArgumentError
             Friction depends on the solution.
         """
-        return branch_test(self._condensed, self)
+        return branch_test(self._condensed, self.problem.affine_friction, self)
 
     @property
     def exact_slips(self) -> tuple[Fraction, ...] | None:

@@ -22,6 +22,7 @@ if TYPE_CHECKING:
     import pandas as pd
     import scipy.sparse as sp
 
+    from enumsol.model.mesh import BodyMesh
     from enumsol.model.statuses import ContactStatus
     from enumsol.proof.proof_file import Proof
     from enumsol.roots.stability import Stability
@@ -564,7 +565,7 @@ def far_notes(roots: Sequence[Any]) -> list[str]:
     width = float(np.max(np.ptp(places, axis=0)))
     if width == 0:
         return []
-    axes = _axes(problem)
+    axes = _axes(problem.mesh, problem.contact_rows, problem.p)
     far, turned = {}, {}
     for k, root in enumerate(roots):
         parts = np.column_stack([root.u_n + problem.gap, root.u_t + problem.slip_offset])
@@ -591,12 +592,11 @@ def _of(roots: Sequence[int], verb: str = "move") -> str:
     return f"{counted(len(roots), 'root')} {verb}{'s' if len(roots) == 1 else ''}"
 
 
-def _axes(problem: Any) -> Floats | None:
+def _axes(mesh: BodyMesh, rows: sp.csr_array, p: int) -> Floats | None:
     """Normal and tangents (p, d, d) of the contact nodes in global axes; None where rows stand for patches."""
-    if problem.mesh.rows is not None:
+    if mesh.rows is not None:
         return None
-    rows = (problem.Bn, problem.Bt) if problem.mesh.points.shape[1] == 2 else (problem.Bn, problem.Bt1, problem.Bt2)
-    return np.stack([problem.mesh.directions(row) for row in rows], axis=1)
+    return np.stack([mesh.directions(rows[k : k + p]) for k in range(0, rows.shape[0], p)], axis=1)
 
 
 def _turn(places: Floats, moved: Floats) -> float:

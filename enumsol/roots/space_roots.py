@@ -42,9 +42,8 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
 
     from enumsol.condensation.space_condensed import EnclosedSpace
-    from enumsol.model.problem3d import ContactProblem3D
     from enumsol.search.certifiers.protocol import UndecidedPart
-    from enumsol.support.array_types import Alpha, Codes, Floats, Indices, Mask
+    from enumsol.support.array_types import Codes, Floats, Indices, Mask
 
 
 #: The first of these that may hold is the status of a root of which several may.
@@ -229,13 +228,6 @@ class SpaceEnumeration(Enumeration[SpaceSolvers]):
         y, w = with_zeros(self.solvers.enclosed, codes, found.y, found.w)
         return self._enclosure(y, w, found.rigid)
 
-    def _rest(self) -> Root:
-        """The unloaded body: nothing moves, and every status holds."""
-        p = self.problem.p
-        still, bounds = (np.zeros(p), np.zeros((p, 2))), [np.zeros(shape) for shape in ((p, 2), (p, 2, 2)) * 2]
-        every = [frozenset(_STATUSES)] * p
-        return self._root([ContactStatus.OPEN] * p, every, still, still, np.full((p, 2), np.nan), 1, Enclosure(*bounds))
-
     # -- what stayed undecided -------------------------------------------------------------------------------------
 
     def _undecided(self, parts: Sequence[UndecidedPart]) -> list[Undecided]:
@@ -298,15 +290,6 @@ def _around(middle: float, radius: float) -> Floats:
     low = middle - radius
     turns = np.floor((low + np.pi) / (2.0 * np.pi))
     return sealed(np.array([low, middle + radius]) - 2.0 * np.pi * turns)
-
-
-def solvers_in_space(problem: ContactProblem3D, alpha: Alpha, arithmetic: str) -> SpaceSolvers:
-    """Solvers for a body that is held, or that nothing holds."""
-    if problem.held:
-        return SpaceSolvers(problem, alpha, arithmetic)
-    from enumsol.search.space.space_floating import FloatingSpaceSolvers  # for such bodies only
-
-    return FloatingSpaceSolvers(problem, alpha, arithmetic)
 
 
 def check_supported(arithmetic: str, method: str, engine: str | None) -> None:

@@ -10,7 +10,7 @@ import numpy as np
 import scipy.sparse as sp
 from scipy.sparse.csgraph import connected_components
 
-from enumsol.arithmetic.balls import SAFE, TINY, UNIT, Ball
+from enumsol.arithmetic.balls import SAFE, TINY, UNIT, Ball, hull
 from enumsol.condensation.data import exactly_at
 from enumsol.condensation.dynamic import DynamicStiffness
 from enumsol.condensation.enclosure import nearest_floats
@@ -18,17 +18,17 @@ from enumsol.errors import InvalidArgumentError
 from enumsol.model.mass import checked_mass
 from enumsol.model.statuses import ContactStatus
 from enumsol.search.stability import Proven, StabilitySearch
-from enumsol.support.arguments import shown
+from enumsol.support.arguments import alpha_value, shown
 from enumsol.support.immutable import Sealed
 from enumsol.support.messages import counted
 from enumsol.trusted.running_away import Motion, Motions, Touching, everywhere
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
+    from collections.abc import Iterator, Sequence
 
     from enumsol.model.problem3d import AnyProblem
     from enumsol.roots.root import Root
-    from enumsol.support.array_types import ArrayLike, Floats, Integers
+    from enumsol.support.array_types import AlphaLike, ArrayLike, Floats, Integers
 
 Verdict = Literal["runs away", "does not run away", "undecided"]
 _OPEN, _STICK, _PLUS = ContactStatus.OPEN, ContactStatus.STICK, ContactStatus.SLIP_PLUS
@@ -229,20 +229,34 @@ class Stabilities:
             return "the root was found in floats, and its statuses are not proven"
         if any(_OPEN in root.active[i] for i in self._unsure(root)):
             return "a contact node may be open or touch, which the bounds of this root do not decide"
-        rubs = np.any([F.mid > 0 for F in _friction(self.problem, root.alpha)], axis=0)
+        rubs = np.any([F.mid > 0 for F in friction_over(self.problem, root.alpha, root.alpha)], axis=0)
         if any(rubs[i] and {_PLUS, _MINUS} <= root.active[i] for i in self._unsure(root)):
             return "a contact node may be at either limit, which the bounds of this root do not decide"
         return None
 
     def settings(self, root: Root, *, every: bool = False) -> Iterator[Setting]:
         """Parts of the body with nodes at their limit, or all."""
-        F = _friction(self.problem, root.alpha)
+        forces = None if root.enclosure is None or self._tangents == 1 else root.enclosure.lambda_t
+        F = friction_over(self.problem, root.alpha, root.alpha)
+        return self.settings_of(root.active, F, forces, self._unsure(root), every=every)
+
+    def settings_of(
+        self,
+        active: Sequence[frozenset[ContactStatus]],
+        F: list[Ball],
+        forces: Floats | None = None,
+        unsure: tuple[int, ...] = (),
+        *,
+        every: bool = False,
+    ) -> Iterator[Setting]:
+        """Parts of the body for statuses that hold, coefficients by axis and, in 3D, bounds of lambda_t (p, 2, 2)."""
         rubs = np.any([f.mid > 0 for f in F], axis=0)
         for part in np.unique(self._part):
             nodes = np.flatnonzero(self._node_part == part).tolist()
-            kinds = {i: _kind(root.active[i], rubs[i]) for i in nodes}
+            kinds = {i: _kind(active[i], rubs[i]) for i in nodes}
             if every or "limit" in kinds.values():
-                yield self._setting(root, F, int(part), kinds)
+                moves = {i: _limit(active[i], F, i, forces) for i, kind in kinds.items() if kind == "limit"}
+                yield self._setting(F, int(part), kinds, moves, unsure)
 
     def _proven(self, root: Root, setting: Setting) -> Proven:
         """What is proven of one part; in 2D the same for all roots with these nodes and friction."""
@@ -263,7 +277,14 @@ class Stabilities:
             return ()
         return tuple(i for i, statuses in enumerate(root.active) if len(statuses) > 1)
 
-    def _setting(self, root: Root, F: list[Ball], part: int, kinds: dict[int, str]) -> Setting:
+    def _setting(
+        self,
+        F: list[Ball],
+        part: int,
+        kinds: dict[int, str],
+        moves: dict[int, tuple[list[Ball], Ball]],
+        unsure: tuple[int, ...],
+    ) -> Setting:
         """A part with nodes that are open, stuck, at their limit or touch."""
         p = self.problem.p
         rubbing = [(k * p, i) for k in range(self._tangents + 1) for i in kinds if not k or F[k - 1].mid[i] > 0]
@@ -272,14 +293,12 @@ class Stabilities:
         dofs = np.flatnonzero(self._part == part)
         columns: list[Ball] = []
         slopes: list[Ball] = []
-        limits = [i for i, kind in kinds.items() if kind == "limit"]
-        for i in limits:
-            move, sinking = _limit(root, F, i)
+        for i, (move, sinking) in moves.items():
             along = {place[(k + 1) * p + i]: x for k, x in enumerate(move) if (k + 1) * p + i in place}
             columns.append(_column(len(rows), along))
             slopes.append(_column(len(rows), along | {place[i]: -sinking}))
         touching: list[Touching] = []
-        signed = [True] * len(limits)
+        signed = [True] * len(moves)
         for i in (i for i, kind in kinds.items() if kind == "touching"):
             own = [(k + 1) * p + i for k in range(self._tangents) if (k + 1) * p + i in place]
             start = len(columns)
@@ -289,15 +308,14 @@ class Stabilities:
             # along axes with friction
             smaller = min((f[i] for f in F), key=lambda f: float(f.mid) or np.inf)
             touching.append(Touching(start, tuple(range(start + 1, start + 1 + len(own))), smaller))
-        unsure = self._unsure(root)
         motions = Motions(
             _stacked(columns, len(rows)),
             _stacked(slopes, len(rows)),
             np.array(signed, dtype=bool),
             tuple(touching),
-            tuple(k for k, i in enumerate(limits) if i in unsure),
+            tuple(k for k, i in enumerate(moves) if i in unsure),
         )
-        return Setting(self._stiffness_of(part, dofs, rows), motions, dofs, rows, limits)
+        return Setting(self._stiffness_of(part, dofs, rows), motions, dofs, rows, list(moves))
 
     def _stiffness_of(self, part: int, dofs: Integers, rows: list[int]) -> DynamicStiffness:
         """Stiffness of some rows of a part."""
@@ -347,26 +365,27 @@ def _kind(active: frozenset[ContactStatus], friction: bool) -> str:
     return "limit" if friction and active != {_STICK} else "stuck"
 
 
-def _friction(problem: Any, alpha: Any) -> list[Ball]:
-    """F along every axis, as balls (p,)."""
-    exact = alpha if isinstance(alpha, Fraction) else Fraction(float(alpha))
+def friction_over(problem: AnyProblem, low: AlphaLike, high: AlphaLike) -> list[Ball]:
+    """F along every axis for all alpha between two, as balls (p,)."""
     first, slope = (np.asarray(part).reshape(problem.p, -1) for part in problem.affine_friction)
     balls = []
     for k in range(first.shape[1]):
-        F, inexact = nearest_floats(exactly_at(exact, first[:, k], slope[:, k]))
-        balls.append(Ball(F, np.where(inexact, 2 * UNIT * F + TINY, 0.0)))
+        ends = []
+        for alpha in (low, high):
+            F, inexact = nearest_floats(exactly_at(Fraction(alpha_value(alpha)), first[:, k], slope[:, k]))
+            ends.append(Ball(F, np.where(inexact, 2 * UNIT * F + TINY, 0.0)))
+        balls.append(hull(ends))
     return balls
 
 
-def _limit(root: Root, F: list[Ball], i: int) -> tuple[list[Ball], Ball]:
+def _limit(active: frozenset[ContactStatus], F: list[Ball], i: int, forces: Floats | None) -> tuple[list[Ball], Ball]:
     """Tangential move of a node at its limit, by axis, and by how much T_i sinks meanwhile (theory, (15.3))."""
     if len(F) == 1:
-        sign = 1.0 if _PLUS in root.active[i] else -1.0
+        sign = 1.0 if _PLUS in active else -1.0
         return [Ball.exact(np.array(sign))], F[0][i]
-    assert root.enclosure is not None
-    bounds = root.enclosure.lambda_t[i]
+    assert forces is not None
     inverse = [_inverse(f[i]) for f in F]
-    force = [Ball(0.5 * (low + high), 0.5 * (high - low) * SAFE + TINY) for low, high in bounds]
+    force = [Ball(0.5 * (low + high), 0.5 * (high - low) * SAFE + TINY) for low, high in forces[i]]
     shares = [x * y for x, y in zip(force, inverse, strict=True)]
     length = float(np.hypot(*(x.mid for x in shares))) or TINY
     # |v / |v| - m / |m|| <= 2 |v - m| / |m|

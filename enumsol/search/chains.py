@@ -14,9 +14,7 @@ import numpy as np
 from enumsol.model.statuses import ACROSS, FRICTIONLESS, SLIP_MINUS, SLIP_PLUS, UNDECIDED
 from enumsol.search.reduction import NEAR, Reduction
 from enumsol.support.deadlines import look
-from enumsol.trusted.selection import (
-    Selection,
-)
+from enumsol.trusted.selection import Selection
 
 if TYPE_CHECKING:
     from enumsol.condensation.condensed import CondensedProblem, ScaledSystem

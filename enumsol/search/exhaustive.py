@@ -19,9 +19,6 @@ if TYPE_CHECKING:
     from enumsol.selections.solution import SelectionSolution, SelectionSolver
     from enumsol.support.array_types import Codes, Floats, Mask, NDArray
 
-#: Most selections that the exhaustive method examines, in floats and in rationals.
-FLOAT_LIMIT = 4**11
-EXACT_LIMIT = 4**7
 #: Selections solved together in floats, and between two reports of progress.
 BLOCK = 2048
 #: Selections whose float solution breaks a condition by more than this are dropped without a second look.
@@ -57,7 +54,7 @@ def exhaustive_float(system: ScaledSystem, solver: SelectionSolver) -> Iterator[
     A vectorised solve screens every block; what it cannot refuse clearly (all conditions nearly hold, or the matrix is
     nearly singular) is decided by ``solver``.
     """
-    total = refuse_if_too_large(solver.F_positive, FLOAT_LIMIT, 20_000.0)
+    total = refuse_if_too_large(solver.F_positive, 4**11, 20_000.0)
     codes = all_codes(solver.F_positive)
     done = 0
     while done < total:
@@ -94,7 +91,7 @@ def _candidates(system: ScaledSystem, block: NDArray[np.int8]) -> Mask:
 
 def exhaustive_exact(solver: SelectionSolver) -> Iterator[tuple[int, SelectionSolution | None]]:
     """Selections examined so far with the last one's solution, or None; in rationals, one linear solve each."""
-    refuse_if_too_large(solver.F_positive, EXACT_LIMIT, 1_000.0)
+    refuse_if_too_large(solver.F_positive, 4**7, 1_000.0)
     for done, codes in enumerate(all_codes(solver.F_positive), start=1):
         yield done, solver.solve(codes)
 

@@ -5,8 +5,7 @@ Nothing here is trusted: the certifier proves what is proposed, or the subtree i
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from typing import TYPE_CHECKING, Protocol
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -24,17 +23,15 @@ from enumsol.model.statuses import (
 )
 from enumsol.search.closing import TreeCloser
 from enumsol.search.fathoming_in_contact import KnownRoot, Lone, LoneProposal
-from enumsol.search.reduction import NEAR, Reduction, WeightSource
+from enumsol.search.reduction import NEAR, Proposal, Reduction, WeightSource
 from enumsol.selections.solution import ActiveSets, SelectionSolution
 
 if TYPE_CHECKING:
     from enumsol.condensation.condensed import ScaledSystem
     from enumsol.relaxation.engine import Relaxation
-    from enumsol.search.certifiers.protocol import Bound
+    from enumsol.search.certifiers.protocol import Bound, Certifier
+    from enumsol.search.reduction import Point
     from enumsol.support.array_types import Codes, Floats
-
-    #: lambda and w, (2p,) arrays each.
-    Point = tuple[Floats, Floats]
 
 #: So many nodes that slide without load make a search begin again.
 _MANY = 3
@@ -42,83 +39,8 @@ _MANY = 3
 _FEW, _LONG = 48, 512
 
 
-@dataclass(frozen=True)
-class Proposal:
-    """The only solution that a subtree may have, as far as floats tell.
-
-    Attributes
-    ----------
-    selection : final codes, of a selection that holds there up to rounding
-    sliding : FORWARD or BACKWARD for nodes that in the proof are open or slip that way
-    free : ascending nodes that have no status in the proof
-    force : (2p,) array, lambda
-    weights : numbers for which the form of theory, (6.9), is definite, or None
-    hopeless : nor would a proof in rationals find any, which frees no nodes and need not serve all theta of one
-    strict : every status in the proof holds strictly
-    least : least slack of the conditions of the fixed nodes
-    reduction : Reduction
-    """
-
-    selection: Codes
-    sliding: dict[int, int]
-    free: tuple[int, ...]
-    force: Floats
-    weights: Floats | None
-    hopeless: bool
-    strict: bool
-    least: float
-    reduction: Reduction
-
-    @property
-    def numbers(self) -> list[float]:
-        """The weights as a proof has them."""
-        return [] if self.weights is None else self.weights.tolist()
-
-    @property
-    def named(self) -> Codes:
-        """The selection with the codes of the sliding nodes."""
-        return tuple(self.sliding.get(i, code) for i, code in enumerate(self.selection))
-
-
-class Closing(Protocol):
-    """A certifier that can close a subtree.
-
-    Attributes
-    ----------
-    hard : bool
-        A complete selection was met that is degenerate, or nearly so.
-    sliding : dict
-        FORWARD or BACKWARD for nodes that touch without load and slide at a solution met.
-    exactly : bool
-        It knows a solution exactly, so that statuses need not hold strictly.
-    plain : bool
-        It takes mu = kappa = 1 and nu = 0 only.
-    lone : bool
-        It can prove that a regular root is alone.
-    """
-
-    hard: bool
-    sliding: dict[int, int]
-    exactly: bool
-    plain: bool
-    lone: bool
-
-    def alone(self, codes: Codes, proposal: LoneProposal, bound: Bound) -> list[SelectionSolution] | None:
-        """The root of what is proposed, if it is proven to be the only one below a partial assignment; else None."""
-
-    def closed(self, codes: Codes, proposal: Proposal | None, near: Point) -> list[SelectionSolution] | None:
-        """The solutions below a partial assignment, none or one, if it can hold one only; None if not proven.
-
-        Parameters
-        ----------
-        codes : of the assignment
-        proposal : what may close it, if anything was found
-        near : lambda and w from which its solution was sought
-        """
-
-
 class Closer(TreeCloser):
-    """Which nodes of the tree are worth a try: all where tries succeed, fewer and fewer where they fail.
+    """Tries to close nodes of the tree: all where tries succeed, fewer and fewer where they fail.
 
     The whole problem comes first, before there is a tree. Where plain numbers fail and nodes are few, numbers are
     sought only when the tree has turned out to be long: that costs as much as many of its nodes.
@@ -126,10 +48,10 @@ class Closer(TreeCloser):
     Parameters
     ----------
     system : ScaledSystem
-    certifier : Closing
+    certifier : Certifier
     """
 
-    def __init__(self, system: ScaledSystem, certifier: Closing) -> None:
+    def __init__(self, system: ScaledSystem, certifier: Certifier) -> None:
         super().__init__()
         self._system, self._certifier, self.sliding = system, certifier, certifier.sliding
         self._alert = self._began_again = False

@@ -1,4 +1,4 @@
-"""What may show that a root is alone below an assignment (theory, section 6.13); nothing here is trusted."""
+"""Proposals to show that a root is alone below an assignment (theory, section 6.13); nothing here is trusted."""
 
 from __future__ import annotations
 

@@ -21,10 +21,10 @@ if TYPE_CHECKING:
     from collections.abc import Callable
 
     from enumsol.condensation.condensed import ScaledSystem
+    from enumsol.relaxation.active_set import IntervalSystem
     from enumsol.relaxation.engine import Engine
-    from enumsol.relaxation.interval_relaxation import IntervalSystem
     from enumsol.support.array_types import Codes, Floats
-    from enumsol.trusted.quadratic_forms import EnclosedForm
+    from enumsol.trusted.quadratic_forms import EnclosedForm, QuadraticForm
 
     Rows = tuple[list[int], list[int]]
 
@@ -56,7 +56,7 @@ class Forms:
         self._better, self._bounding, self._nodes = better, bounding, nodes
         #: Relaxations with the form in use, and that form, an EnclosedForm or SlipForm; None for the energy.
         self.engine: Engine | None = None
-        self.form: Any = None
+        self.form: QuadraticForm | None = None
 
     def due(self, nodes: int, covered: float) -> bool:
         """True if it is time to try a form."""
@@ -67,7 +67,7 @@ class Forms:
         """True if a search of so many nodes has tried a form."""
         return nodes >= self._nodes
 
-    def use(self, engine: Engine, form: Any) -> None:
+    def use(self, engine: Engine, form: QuadraticForm | None) -> None:
         """Go on with a form that is known already, or with the energy."""
         if form is not None and form is self.form:
             return
@@ -90,7 +90,7 @@ def plane_forms(scaled: ScaledSystem, enclosed: EnclosedSystem) -> Forms:
         return ascended(scaled, enclosed, engine, codes, rows) if isinstance(engine, ActiveSetEngine) else None
 
     def bounding(engine: Engine, form: EnclosedForm) -> Engine | None:
-        return engine.bounding(scaled, form) if isinstance(engine, ActiveSetEngine) else None
+        return engine.bounding(form) if isinstance(engine, ActiveSetEngine) else None
 
     return Forms(better, bounding, NODES)
 

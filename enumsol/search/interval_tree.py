@@ -16,7 +16,7 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, NamedTuple
 
 from enumsol.model.statuses import CONTACT, OPEN, UNDECIDED
-from enumsol.relaxation.interval_relaxation import IntervalEngine, IntervalSystem, PieceForm, interval_rows
+from enumsol.relaxation.active_set import ActiveSetEngine, IntervalSystem, PieceForm, interval_rows
 from enumsol.search.form_policy import PairedTerms, better_form
 from enumsol.search.splitting import ImposedRows, PlaneSplitting, branching_node
 from enumsol.support.deadlines import Deadline, TimeOverError, within
@@ -126,7 +126,7 @@ class _Program:
 
     def __init__(self, system: IntervalSystem, form: PieceForm | None = None) -> None:
         self.splitting = IntervalSplitting(system)
-        self._engine, self._p = IntervalEngine(system, form), system.p
+        self._engine, self._p = ActiveSetEngine.over(system, form), system.p
         self._rows = ImposedRows(self.splitting, system.p)
 
     def relax(self, item: _Item, parent: Relaxation | None) -> Relaxation:

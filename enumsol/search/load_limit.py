@@ -16,13 +16,8 @@ if TYPE_CHECKING:
 #: A load this near to the limit, relative to itself, counts as one at it: where it is larger, loads for which balls
 #: decide count, too; smaller ones are missed where data have been rounded, or directions of friction in 3D are sought.
 LIMIT_TOLERANCE = 1e-9
-#: A first answer that is inside the limit by more than this share needs no other directions of friction.
-_INSIDE = 1e-4
-#: Directions of friction at a node in 3D to begin with, and how often others are added at most, until none works more
-#: along the motion than this share.
-_DIRECTIONS, _ROUNDS, _PRECISE = 8, 40, 1e-13
-#: Forces that work less than this share along a motion are on the border; steps of Newton's method that put them there.
-_ACTIVE, _STEPS = 1e-5, 4
+#: Forces that work less than this share along a motion are on the border.
+_ACTIVE = 1e-5
 _OPTIONS = {"primal_feasibility_tolerance": 1e-10, "dual_feasibility_tolerance": 1e-10}
 
 
@@ -96,22 +91,22 @@ def _motion(load: Floats, normals: Floats, across: Floats) -> Floats | None:
     from scipy.optimize import linprog  # only bodies that nothing holds need it
 
     _, d, r = across.shape
-    angles = 2.0 * np.pi * np.arange(_DIRECTIONS) / _DIRECTIONS
+    angles = 0.25 * np.pi * np.arange(8)  # directions of friction at a node in 3D to begin with
     corners = np.array([[1.0], [-1.0]]) if d == 1 else np.stack([np.cos(angles), np.sin(angles)], axis=1)
     rays = (normals[:, None] + np.einsum("kd,pdr->pkr", corners, across)).reshape(-1, r)
     pressing = normals.sum(axis=0) / max(float(np.max(np.abs(normals.sum(axis=0)))), np.finfo(float).tiny)
-    for _ in range(_ROUNDS):
+    for _ in range(40):
         found = linprog(-load, rays, np.zeros(len(rays)), pressing[None], [-1.0], (None, None), options=_OPTIONS)
         if found.status != 0:
             return None
         z = np.array(found.x)
-        if load @ z < -_INSIDE * np.max(np.abs(z)):
-            return None
+        if load @ z < -1e-4 * np.max(np.abs(z)):
+            return None  # well inside: it needs no other directions
         limits = _at_limit(z, normals, across)
-        if d == 1 or not np.any(limits @ z > _PRECISE * np.max(np.abs(rays @ z))):
+        if d == 1 or not np.any(limits @ z > 1e-13 * np.max(np.abs(rays @ z))):
             break
         rays = np.vstack([rays, limits])
-    for _ in range(_STEPS):  # the solver is content with seven digits
+    for _ in range(4):  # the solver is content with seven digits
         limits = _at_limit(z, normals, across)
         work = limits @ z
         tight = np.vstack([limits[np.abs(work) <= _ACTIVE * np.max(np.abs(work))], pressing])

@@ -159,7 +159,10 @@ class Spread(ABC):
             tree.stop_for_time()
         elif left is not None and part.answer.nodes > left:
             # the last part before the limit is shorter
-            stack[-1:] = self._parts(part.place, tree.examined(part.roots, left))[::-1]
+            parts = self._parts(part.place, tree.examined(part.roots, left))
+            stack[-1:] = parts[::-1]
+            if tree.left:
+                self._hand_out(parts)
         else:
             self._take(stack, part.answer)
 

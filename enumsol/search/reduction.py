@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import enum
+from dataclasses import dataclass
 from functools import cached_property
 from typing import TYPE_CHECKING
 
@@ -18,6 +19,8 @@ if TYPE_CHECKING:
     from enumsol.condensation.condensed import ScaledSystem
     from enumsol.support.array_types import Codes, Floats, Indices, Mask
 
+    #: lambda and w, (2p,) arrays each.
+    Point = tuple[Floats, Floats]
 
 #: A condition of a scaled problem within this of zero may hold as an equation; only the choice of what to try rests on
 #: it.
@@ -238,3 +241,41 @@ def weights_of(R: Floats, nodes: Nodes, sought: WeightSource = WeightSource.CENT
             return search(R, nodes).numbers()
     except np.linalg.LinAlgError:
         return None
+
+
+@dataclass(frozen=True)
+class Proposal:
+    """The only solution that a subtree may have, as far as floats tell.
+
+    Attributes
+    ----------
+    selection : final codes, of a selection that holds there up to rounding
+    sliding : FORWARD or BACKWARD for nodes that in the proof are open or slip that way
+    free : ascending nodes that have no status in the proof
+    force : (2p,) array, lambda
+    weights : numbers for which the form of theory, (6.9), is definite, or None
+    hopeless : nor would a proof in rationals find any, which frees no nodes and need not serve all theta of one
+    strict : every status in the proof holds strictly
+    least : least slack of the conditions of the fixed nodes
+    reduction : Reduction
+    """
+
+    selection: Codes
+    sliding: dict[int, int]
+    free: tuple[int, ...]
+    force: Floats
+    weights: Floats | None
+    hopeless: bool
+    strict: bool
+    least: float
+    reduction: Reduction
+
+    @property
+    def numbers(self) -> list[float]:
+        """The weights as a proof has them."""
+        return [] if self.weights is None else self.weights.tolist()
+
+    @property
+    def named(self) -> Codes:
+        """The selection with the codes of the sliding nodes."""
+        return tuple(self.sliding.get(i, code) for i, code in enumerate(self.selection))

@@ -46,7 +46,7 @@ class Referring(Protocol):
     """A certifier that can prove that a known root is the only one below an assignment."""
 
     def reference(self, selection: Codes) -> Any:
-        """The form of a root, a Reference or SpaceReference, if one is proven definite; or None."""
+        """The form of a root, a Reference or LeafReference, if one is proven definite; or None."""
 
     def only_root(self, codes: Codes, reference: Any, proposal: OnlyRoot) -> list[Any] | None:
         """The roots below an assignment, this one if it was not told before, or none; None if not proven."""

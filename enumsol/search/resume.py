@@ -63,7 +63,7 @@ class Reader:
         return next((form for said, form in used if said.serves(codes) and own in (None, said.codes)), None)
 
     def bound(self, leaf: leaves.Excluded) -> Bound:
-        """What is said to exclude a partial assignment; ValueError where that is a form which is not proven."""
+        """Bound that is said to exclude a partial assignment; ValueError where its form is not proven."""
         if not isinstance(leaf.by, int):
             return RecordedBound(leaf.rows, leaf.values)
         said = self._declared[-leaf.by]
@@ -160,7 +160,7 @@ class Replay:
         return True
 
     def _proven(self, item: TreeNode, record: list[Any]) -> bool:
-        """Whether a leaf is proven again, and written."""
+        """True if a leaf is proven again, and written."""
         search = self._search
         try:
             leaf = self._reader.read(item.codes, record)

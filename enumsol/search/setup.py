@@ -16,6 +16,7 @@ from enumsol.search.tree import TreeSearch
 if TYPE_CHECKING:
     from collections.abc import Callable
 
+    from enumsol.condensation.enclosure import RigidRows
     from enumsol.model.problem3d import AnyProblem
     from enumsol.proof.writer import Recorder
     from enumsol.relaxation.engine import Engine
@@ -25,10 +26,20 @@ if TYPE_CHECKING:
     from enumsol.search.outcome import SearchLimits, SearchProgress
     from enumsol.search.resume import Reader
     from enumsol.search.splitting import Splitting
-    from enumsol.support.array_types import Alpha, Codes
+    from enumsol.support.array_types import Alpha, Codes, Floats
 
 #: Stiffness of the springs by which a solution of a body that nothing holds is approached, relative to the body's own.
 _SPRINGS = tuple(2.0**-k for k in range(0, 21, 4))
+#: That of the springs of its relaxations (theory, section 14.5).
+WEAK = 2.0**-20
+
+
+def weakly_held(S: Floats, g: Floats, rows: RigidRows, stiffness: float = WEAK) -> tuple[Floats, ...]:
+    """S and g with weak springs in place of those that they have."""
+    G, h = rows.G.mid, rows.h.mid
+    soft = G.T / stiffness
+    S = S + soft @ G
+    return 0.5 * (S + S.T), g + soft @ h
 
 
 class SearchSetup(ABC):
@@ -52,7 +63,7 @@ class SearchSetup(ABC):
     scaled: Any
     _engine: Any
 
-    def __init__(self, problem: AnyProblem, alpha: Alpha, arithmetic: Any) -> None:
+    def __init__(self, problem: AnyProblem, alpha: Alpha, arithmetic: str) -> None:
         if arithmetic == "fast" and not problem.held:
             raise InvalidArgumentError(f'arithmetic is "fast" for a body that nothing holds; expected {self._offered}')
         self.problem: Any = problem

@@ -3,14 +3,16 @@
 from __future__ import annotations
 
 import warnings
+from contextlib import suppress
+from dataclasses import replace
 from fractions import Fraction
 from functools import cached_property, partial
-from typing import TYPE_CHECKING, Any, Literal, cast
+from typing import TYPE_CHECKING, Literal, TypeVar
 
 import numpy as np
 
 from enumsol.condensation.data import EXACT_DOF_LIMIT, exactly_at
-from enumsol.condensation.enclosure import EnclosedSystem, NotEnclosedError
+from enumsol.condensation.enclosure import EnclosedSystem, NotEnclosedError, RigidRows, enclosure_of
 from enumsol.errors import InvalidArgumentError, MissingDependencyError
 from enumsol.model.statuses import UNDECIDED
 from enumsol.proof.records import Limits, Tree
@@ -18,15 +20,17 @@ from enumsol.proof.writer import Recorder
 from enumsol.relaxation.active_set import ActiveSetEngine
 from enumsol.relaxation.engine import Engine, not_compiled
 from enumsol.relaxation.interior_point import InteriorPointEngine
+from enumsol.search.certifiers.exclusions import Exclusions
 from enumsol.search.certifiers.float_certifier import FastCertifier
 from enumsol.search.certifiers.verified import VerifiedCertifier
 from enumsol.search.closing import TreeCloser
-from enumsol.search.fathoming import Closer, Closing, propose
+from enumsol.search.fathoming import Closer, propose
 from enumsol.search.form_policy import Forms, plane_forms
 from enumsol.search.nodes import Relaxations
 from enumsol.search.reduction import WeightSource
+from enumsol.search.reference_closer import LeadingCloser
 from enumsol.search.resume import Reader
-from enumsol.search.setup import SearchSetup
+from enumsol.search.setup import WEAK, SearchSetup, weakly_held
 from enumsol.search.splitting import PlaneSplitting
 from enumsol.search.tree import TreeSearch
 from enumsol.selections.float_selections import FloatSelections
@@ -38,14 +42,15 @@ if TYPE_CHECKING:
     from enumsol.model.problem import ContactProblem
     from enumsol.search.certifiers.protocol import Certifier
     from enumsol.search.certifiers.rational_certifier import ExactCertifier
-    from enumsol.search.fathoming import Point
     from enumsol.search.outcome import SearchLimits
+    from enumsol.search.reduction import Point
     from enumsol.selections.rational_selections import ExactSelections
     from enumsol.support.array_types import Alpha, Codes, Floats
     from enumsol.trusted.at_alpha import VerifiedSelection
     from enumsol.trusted.precise_at_alpha import PreciseAtAlpha
 
 Arithmetic = Literal["fast", "verified", "exact"]
+_T = TypeVar("_T")
 
 
 def make_engine(system: ScaledSystem, name: str | None = None) -> Engine:
@@ -82,7 +87,7 @@ def plane_search(
 
 
 class Solvers(SearchSetup):
-    """Solvers and certifier for one problem at one alpha (of a body that is held; for others ``floating_solvers``).
+    """Solvers and certifier for one problem at one alpha.
 
     Parameters
     ----------
@@ -102,8 +107,7 @@ class Solvers(SearchSetup):
         S is not positive definite: exactly where rationals decide what balls leave open, otherwise beyond rounding.
     """
 
-    #: Units of the rigid displacement of a body that nothing holds.
-    rigid_unit: Floats | None = None
+    scaled: ScaledSystem
 
     def __init__(
         self, problem: ContactProblem, alpha: Alpha, arithmetic: Arithmetic, tolerance: float, engine: str | None = None
@@ -129,6 +133,27 @@ class Solvers(SearchSetup):
             )
 
     @cached_property
+    def rows(self) -> RigidRows:
+        """Equilibrium of a body as a whole that nothing holds."""
+        return RigidRows.of(self.problem, Fraction(self.alpha), self.scaled.force, self.scaled.length)
+
+    @property
+    def rigid_unit(self) -> Floats | None:
+        """Units of the coordinates of the rigid displacement, (r,); None of a body that is held."""
+        return None if self.problem.held else self.rows.unit
+
+    @cached_property
+    def relaxed(self) -> ScaledSystem:
+        """The system of the relaxations; of a body that nothing holds, on weak springs (theory, section 14.5)."""
+        return self._on_springs(WEAK)
+
+    def _on_springs(self, stiffness: float) -> ScaledSystem:
+        if self.problem.held:
+            return self.scaled
+        S, g = weakly_held(self.scaled.S, self.scaled.g, self.rows, stiffness)
+        return replace(self.scaled, S=S, g=g, cholesky=np.asarray(np.linalg.cholesky(S), dtype=np.float64))
+
+    @cached_property
     def exact(self) -> ExactSelections | None:
         """Selections in rationals; None when the problem is too large for them.
 
@@ -142,17 +167,15 @@ class Solvers(SearchSetup):
 
         if self.arithmetic != "exact" and not self._in_rationals:
             return None
-        # verified arithmetic asks about few selections, exact arithmetic about all
-        apart = self.arithmetic == "verified" and self.problem.n > FAST_EXACT_DOF
-        system = (
-            UncondensedSystem(self.problem, self.alpha, self._index)
-            if apart
-            else ExactSystem.from_problem(self.problem, self.alpha)
-        )
+        system: ExactSystem | UncondensedSystem
+        if self.problem.held and self.arithmetic == "verified" and self.problem.n > FAST_EXACT_DOF:
+            # verified arithmetic asks about few selections, exact arithmetic about all
+            system = UncondensedSystem(self.problem, self.alpha, self._index)
+        else:
+            system = ExactSystem.from_problem(self.problem, self.alpha)
         enclosed, data = self._enclosed
-        proven = enclosed is not None and data == "problem"
-        if not proven:
-            check_definite(system.S)
+        if enclosed is None or data == "condensed":
+            check_definite(system.contact_compliance if isinstance(system, ExactSystem) else system.S)
         return ExactSelections(system)
 
     @cached_property
@@ -160,23 +183,46 @@ class Solvers(SearchSetup):
         """The certifier in rationals; None when the problem is too large, or only condensed data are certified."""
         if self.data == "condensed" or self.exact is None:
             return None
+        return self._in_exact_arithmetic(self.exact)
+
+    def _in_exact_arithmetic(self, exact: ExactSelections) -> ExactCertifier:
         from enumsol.search.certifiers.rational_certifier import ExactCertifier  # python-flint
 
-        return ExactCertifier(self.exact, self.scaled, self.enclosed, self._solved_precisely)
+        precisely = None if self.arithmetic == "exact" else self._solved_precisely
+        return ExactCertifier(exact, self.scaled, self.exclusions, precisely)
+
+    @cached_property
+    def exclusions(self) -> Exclusions | None:
+        """Ways to exclude assignments; None without balls."""
+        if self.enclosed is None or self.problem.held:
+            return None if self.enclosed is None else Exclusions(self.enclosed)
+        return Exclusions(self.enclosed, self._rests_on_reach, within=self._rounding_decides)
+
+    @cached_property
+    def _rounding_decides(self) -> bool:
+        """True if what a bound is needed for is not worth being found in rationals (theory, section 14.12)."""
+        from enumsol.condensation.exact import FAST_EXACT_DOF  # python-flint
+
+        return self.problem.n > FAST_EXACT_DOF and self.at_limit is not None
+
+    def _rests_on_reach(self, codes: Codes) -> bool:
+        """True if a complete selection without a solution may have one beyond the bound."""
+        return self._rounding_decides or self.exact is None or self.exact.rests_on_reach(codes, None)
 
     @cached_property
     def _enclosed(self) -> tuple[EnclosedSystem | None, str]:
         system = self.scaled
-        try:
-            enclosed = self.problem.enclosure.at(self.alpha, system.force, system.length)
-            if _positive(enclosed):
+        with suppress(NotEnclosedError):
+            enclosed = enclosure_of(self.problem).at(self.alpha, system.force, system.length)
+            if enclosed.smallest_eigenvalue > 0:
                 return enclosed, "problem"
-        except NotEnclosedError:
-            pass
-        if self._in_rationals or not self.problem.known_exactly:
+        if self._in_rationals or not (self.problem.known_exactly and self.problem.held):
             return None, "problem"
-        enclosed = EnclosedSystem.as_computed(system.S, system.g, system.F)
-        return (enclosed if _positive(enclosed) else None), "condensed"
+        with suppress(NotEnclosedError):
+            enclosed = EnclosedSystem.as_computed(system.S, system.g, system.F)
+            if enclosed.smallest_eigenvalue > 0:
+                return enclosed, "condensed"
+        return None, "condensed"
 
     @property
     def enclosed(self) -> EnclosedSystem | None:
@@ -200,12 +246,12 @@ class Solvers(SearchSetup):
         if self.arithmetic == "fast":
             return FastCertifier(self.floats)
         if self.arithmetic == "exact":
-            from enumsol.search.certifiers.rational_certifier import ExactCertifier  # python-flint
-
-            return ExactCertifier(_present(self.exact), self.scaled, self.enclosed)
+            # of a body that nothing holds it is known once whether a conclusion rests on the bound
+            own = self._in_exact_arithmetic(_present(self.exact)) if self.problem.held else self.exact_certifier
+            return _present(own)
         ids = self.problem.node_ids
         exact = lambda: self.exact_certifier  # noqa: E731
-        return VerifiedCertifier(self.scaled, self.enclosed, exact, _present(recorder), ids, self._solved_precisely)
+        return VerifiedCertifier(self.scaled, self.exclusions, exact, _present(recorder), ids, self._solved_precisely)
 
     def _solved_precisely(self, codes: Codes) -> VerifiedSelection | None:
         """The verified solution of a complete selection in many digits; None where that is not to be had."""
@@ -222,7 +268,7 @@ class Solvers(SearchSetup):
         from enumsol.condensation.exact import FAST_EXACT_DOF
         from enumsol.trusted.precise_at_alpha import PreciseAtAlpha  # python-flint
 
-        if self.problem.n <= FAST_EXACT_DOF or self.data == "condensed":
+        if self.problem.n <= FAST_EXACT_DOF or self.data == "condensed" or not self.problem.held:
             return None
         return PreciseAtAlpha.of(self.problem, Fraction(self.alpha), self.scaled.force, self.scaled.length)
 
@@ -243,10 +289,12 @@ class Solvers(SearchSetup):
         return None
 
     def _splitting(self, certifier: Certifier) -> PlaneSplitting:
-        return PlaneSplitting(self.scaled.F, sliding=certifier.sliding)
+        return PlaneSplitting(self.scaled.F, sliding=certifier.sliding if self.problem.held else None)
 
     def _closer(self, certifier: Certifier) -> TreeCloser | None:
-        return Closer(self.scaled, cast("Closing", certifier))
+        if self.problem.held:
+            return Closer(self.scaled, certifier)
+        return LeadingCloser(certifier, lambda: self.known_root)
 
     @cached_property
     def _forms(self) -> Forms | None:
@@ -276,14 +324,7 @@ class Solvers(SearchSetup):
         return Reader(limits, system)
 
 
-def _positive(system: EnclosedSystem) -> bool:
-    try:
-        return system.smallest_eigenvalue > 0
-    except NotEnclosedError:
-        return False
-
-
-def _present(value: Any) -> Any:
+def _present(value: _T | None) -> _T:
     if value is None:
         raise AssertionError("this arithmetic has no such solver")
     return value

@@ -9,7 +9,7 @@ from __future__ import annotations
 import itertools
 from dataclasses import dataclass, field
 from functools import cached_property, partial
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, cast
 
 import numpy as np
 import scipy.linalg
@@ -277,6 +277,24 @@ class StabilitySearch:
                         yield tried, found
                         break
 
+    def zero_near(self, known: Growing) -> float | None:
+        """About the mu at which a motion grows that grew at another one under slightly other coefficients."""
+        rows, model = known.equations(self.motions), Spectrum.of(self.stiffness)
+        if rows is None or model is None:
+            return 0.5 * (known.low + known.high)
+        left, right, signed = rows[0].mid, self.motions.moves.mid[:, rows[1]], self.motions.signed[rows[1]]
+        samples = 0.5 * (known.low + known.high) * np.geomspace(0.125, 8.0, 24)
+        forces = [None if (K := model.at(mu)) is None else left.T @ K.mid @ right for mu in samples.tolist()]
+        if any(of is None for of in forces):
+            return None
+        values = _forward(np.array(forces), signed)
+        changes = np.flatnonzero(np.sign(values[:-1]) * np.sign(values[1:]) < 0)
+        if not len(changes):
+            return None
+        i = int(changes[np.argmin(np.abs(changes - 11.5))])
+        share = values[i] / (values[i] - values[i + 1])
+        return float(samples[i] * (samples[i + 1] / samples[i]) ** share)
+
     def _candidates(self, values: list[Floats]) -> Iterator[tuple[tuple[int, ...], tuple[int, ...]]]:
         """Sets of nodes that may slide, with statuses of those that touch."""
         limits, touching = self.motions.limits, self.motions.touching
@@ -474,6 +492,12 @@ class Spectrum:
         """None of a large body, or where the eigenvalues are not found."""
         if stiffness.A.shape[0] > _SPECTRUM:
             return None
+        if stiffness.spectrum is None:
+            stiffness.spectrum = cls._found(stiffness)
+        return cast("Spectrum", stiffness.spectrum)
+
+    @classmethod
+    def _found(cls, stiffness: DynamicStiffness) -> Spectrum | None:
         A, M = stiffness.A.toarray(), stiffness.M.toarray()
         shift = 0.0 if stiffness.held else 1e-3 * float(np.trace(A) / np.trace(M))
         try:

@@ -19,10 +19,10 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from enumsol.model.statuses import UNDECIDED
-from enumsol.relaxation.interval_relaxation import IntervalSystem
-from enumsol.search.floating_solvers import WEAK
+from enumsol.relaxation.active_set import IntervalSystem
 from enumsol.search.interval_tree import LARGEST_TREE, EmptyLeaf, SubintervalTree, Subtree, TreeResult
 from enumsol.search.outcome import Stop, StopReason
+from enumsol.search.setup import WEAK
 from enumsol.support.workers import Crew, Job
 from enumsol.trusted.over_interval import PieceNumbers
 

@@ -154,7 +154,7 @@ class SelectionFunctions:
         bound = self._forces[node] * fmpz_poly([data.F0[node], data.F1[node]])
         return bound - direction * data.friction_unit * self._forces[self.exact.p + node]
 
-    def forces_at(self, alpha: Any) -> tuple[Any, ...] | None:
+    def forces_at(self, alpha: fmpq) -> tuple[Any, ...] | None:
         """lambda at a rational alpha, exactly; None where the quotients are 0 / 0 and no limit exists there."""
         det, force, shift = self.det, self.exact.integers.force, fmpz_poly([-alpha.p, alpha.q])
         numerators = self._forces

@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import math
+from copy import copy
 from fractions import Fraction
 from functools import cached_property
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, SupportsFloat
 
 import numpy as np
 from flint import fmpq, fmpq_mat
@@ -26,9 +27,9 @@ if TYPE_CHECKING:
     from enumsol.support.array_types import Codes, Floats, Integers, NDArray
 
 
-def _outward(number: Any) -> tuple[float, float]:
+def _outward(number: fmpq) -> tuple[float, float]:
     """The floats next below and above a rational; the same one twice if it is a float."""
-    exact = Fraction(int(number.p), int(number.q))
+    exact = to_fraction(number)
     near = float(exact)
     if near == exact:
         return near, near
@@ -103,15 +104,6 @@ class ExactSelections:
         reduced, rank = fmpq_mat(table).rref()
         rows = reduced.tolist()[:rank]
         return rows, [next(j for j, v in enumerate(row) if v != 0) for row in rows]
-
-    @staticmethod
-    def as_float(number: Any) -> float:
-        """The nearest float."""
-        return float(Fraction(int(number.p), int(number.q)))
-
-    def pushed(self, direction: tuple[Any, ...]) -> ExactSelections:
-        """The solver whose g is a direction."""
-        return ExactSelections(self.system.along(direction))
 
     # -- solving ---------------------------------------------------------------------------------------------------
 
@@ -244,12 +236,14 @@ class ExactSelections:
         if solution.det_sign == 0:
             return 0
         push = tuple(fmpq(int(v)) for v in direction)
-        moved = self.solve_equations(solution.codes, self.system.along(push).g)
+        pushed = copy(self)
+        pushed.system = self.system.along(push)
+        moved = self.solve_equations(solution.codes, pushed.system.g)
         if moved is None:  # det_sign says otherwise
             raise AssertionError("a regular selection became singular")
         step, sign = moved
         _, inequalities = self.forms(solution.codes)
-        _, rates = self.pushed(push).forms(solution.codes)
+        _, rates = pushed.forms(solution.codes)
         point = solution.vertices[0]
         for condition, rate in zip(inequalities, rates, strict=True):
             if value(condition, point) == 0:
@@ -264,15 +258,15 @@ class ExactSelections:
 
     def forces(self, point: Point) -> Floats:
         """lambda as floats."""
-        return np.array([self.as_float(v) for v in point[: 2 * self.p]])
+        return np.array([as_float(v) for v in point[: 2 * self.p]])
 
     def rigid(self, point: Point) -> Floats:
         """Coordinates q of the rigid displacement as floats, shape (r,)."""
-        return np.array([-self.as_float(v) for v in point[2 * self.p :]])
+        return np.array([-as_float(v) for v in point[2 * self.p :]])
 
     def displacements(self, point: Point) -> Floats:
         """w = g - S lambda as floats, rounded once."""
-        return np.array([self.as_float(v) for v in self.moved(point)[: 2 * self.p]])
+        return np.array([as_float(v) for v in self.moved(point)[: 2 * self.p]])
 
     def slip_signs(self, point: Point) -> tuple[int, ...]:
         """Signs of w_t, exactly."""
@@ -300,13 +294,10 @@ class FiberSelections(ExactSelections):
     ----------
     exact : ExactCondensed
     alpha : fmpq or NumberFieldElement
-    push : direction that replaces g, in the perturbations that give the local degree
     """
 
-    def __init__(self, exact: ExactCondensed, alpha: object, push: tuple[Any, ...] | None = None) -> None:
-        system = exact.system(alpha)
-        super().__init__(system if push is None else system.along(push))
-        self.exact, self.alpha = exact, alpha
+    def __init__(self, exact: ExactCondensed, alpha: object) -> None:
+        super().__init__(exact.system(alpha))
         self.F_positive = tuple(not without for without in exact.frictionless)
 
     @staticmethod
@@ -340,17 +331,8 @@ class FiberSelections(ExactSelections):
         pivots = row_reduce(table)[1]
         return table[: len(pivots)], pivots
 
-    @staticmethod
-    def as_float(number: object) -> float:
-        """The nearest float."""
-        return as_float(number)
 
-    def pushed(self, direction: tuple[Any, ...]) -> FiberSelections:
-        """The solver whose g is a direction."""
-        return FiberSelections(self.exact, self.alpha, direction)
-
-
-def as_float(value: Any) -> float:
+def as_float(value: fmpq | SupportsFloat) -> float:
     """The nearest float of a field element."""
     return float(to_fraction(value)) if isinstance(value, fmpq) else float(value)
 

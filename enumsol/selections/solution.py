@@ -51,8 +51,14 @@ class SelectionSolution:
     possible: ActiveSets | None = None
 
 
-class PointValues(Protocol):
-    """Values at the points of a solution, whose representation of lambda is the solver's own."""
+class SelectionSolver(Protocol):
+    """Solves selections and decides about their solutions in one arithmetic (floats with a tolerance, or rationals).
+
+    The representation of lambda at points is the solver's own.
+    """
+
+    p: int
+    F_positive: tuple[bool, ...]
 
     def forces(self, point: Any) -> np.ndarray[Any, Any]:
         """The point's lambda as floats, shape (2p,), unscaled."""
@@ -68,13 +74,6 @@ class PointValues(Protocol):
 
     def bounds(self, point: Any) -> tuple[np.ndarray[Any, Any], np.ndarray[Any, Any]] | None:
         """Proven bounds of (lambda, w, q) at the point, two (4p + r,) arrays; None in an arithmetic without any."""
-
-
-class SelectionSolver(PointValues, Protocol):
-    """Solves selections and decides about their solutions in one arithmetic (floats with a tolerance, or rationals)."""
-
-    p: int
-    F_positive: tuple[bool, ...]
 
     def solve(self, codes: Codes) -> SelectionSolution | None:
         """All roots in the selection, or None when there is none."""

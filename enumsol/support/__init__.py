@@ -1,1 +1,1 @@
-"""What every room uses: arguments of calls, messages, files, deadlines, workers."""
+"""Tools of every room: arguments of calls, messages, files, deadlines, workers."""

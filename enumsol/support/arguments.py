@@ -18,12 +18,12 @@ import numbers
 import operator
 import os
 import re
-from collections.abc import Callable, Collection, Mapping
+from collections.abc import Callable, Collection, Iterable, Mapping
 from decimal import Decimal
 from fractions import Fraction
 from pathlib import Path
 from reprlib import Repr
-from typing import Any, TypeVar
+from typing import Any, SupportsIndex, TypeVar, cast
 
 import numpy as np
 
@@ -32,15 +32,11 @@ from enumsol.support.array_types import Alpha, NDArray
 
 #: Most binary digits of a numerator or denominator: four times those of any float64, which bounds the cost.
 MAX_BITS = 4096
-#: Most characters of a text: enough for every fraction within MAX_BITS.
-MAX_TEXT = 2600
 _DECIMAL = re.compile(r"[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?", re.ASCII)
 _FRACTION = re.compile(r"([+-]?\d+)(?:\s*/\s*(\d+))?", re.ASCII)
 _EXPECTED = "expected a finite real number such as 2.5 or a fraction such as 8/3"
 _RANGE = "expected a finite real number in the range of float64: 0, or 5e-324 to 1.8e308 in size"
 _SHOWN = 60
-#: Names that a refused one is answered with.
-_MOST_NAMES = 40
 
 T = TypeVar("T")
 N = TypeVar("N", float, "Alpha")
@@ -169,7 +165,7 @@ def _from_decimal(value: Decimal) -> float | Fraction:
 
 
 def _from_text(text: str, name: str) -> float | Fraction | None:
-    stripped = text.strip() if len(text) <= MAX_TEXT else ""
+    stripped = text.strip() if len(text) <= 2600 else ""  # enough for every fraction within MAX_BITS
     fraction = _FRACTION.fullmatch(stripped)
     if fraction is not None:
         denominator = int(fraction[2] or 1)
@@ -196,7 +192,7 @@ def text_of(value: object, name: str) -> str:
     return value
 
 
-def alpha_list(values: Any, name: str = "alphas") -> list[Alpha]:
+def alpha_list(values: object, name: str = "alphas") -> list[Alpha]:
     """The exact values of several alphas, in their order.
 
     Raises
@@ -205,7 +201,7 @@ def alpha_list(values: Any, name: str = "alphas") -> list[Alpha]:
         It is one number or a text instead of several, or one of them is no alpha.
     """
     try:
-        several = None if isinstance(values, (str, bytes, bytearray)) else iter(values)
+        several = None if isinstance(values, (str, bytes, bytearray)) else iter(cast("Iterable[object]", values))
     except TypeError:
         several = None
     if several is None:
@@ -265,10 +261,11 @@ def _in_order(low: N, high: N, value: object, name: str) -> tuple[N, N]:
     return low, high
 
 
-def _pair(value: Any, name: str) -> list[Any]:
+def _pair(value: object, name: str) -> list[Any]:
+    given = cast("Collection[Any]", value)
     unordered = isinstance(value, (str, bytes, bytearray, set, frozenset, dict))
     try:
-        ends = [] if unordered or len(value) != 2 else list(value)
+        ends = [] if unordered or len(given) != 2 else list(given)
     except TypeError:
         ends = []
     if len(ends) != 2:
@@ -341,9 +338,9 @@ def _real(value: object, name: str, admissible: Callable[[float], bool], expecte
     return number
 
 
-def _whole(value: Any, name: str, admissible: Callable[[int], bool], expected: str) -> int:
+def _whole(value: object, name: str, admissible: Callable[[int], bool], expected: str) -> int:
     try:
-        number = None if isinstance(value, (bool, np.bool_)) else operator.index(value)
+        number = None if isinstance(value, (bool, np.bool_)) else operator.index(cast("SupportsIndex", value))
     except TypeError:
         number = None
     if number is None or not admissible(number):
@@ -377,7 +374,7 @@ def entry_named(name: object, entries: Mapping[str, T], where: str, example: str
     if name in entries:
         return entries[name]
     close = close_names(name, entries)
-    some = list(entries)[:_MOST_NAMES]
+    some = list(entries)[:40]
     more = f" and {len(entries) - len(some)} more" if len(entries) > len(some) else ""
     known = f"did you mean {', '.join(close)}?" if close else f"expected one of {', '.join(some)}{more}"
     raise InvalidArgumentError(f"{where} has no problem named {shown(name)}; {known}")
@@ -416,10 +413,10 @@ def optional_executor(value: object, jobs: object = None) -> None:
             raise InvalidArgumentError("executor and jobs are both given; expected one of them, or neither")
 
 
-def file_path(value: Any, name: str, expected: str = "the name of a file") -> Path:
+def file_path(value: object, name: str, expected: str = "the name of a file") -> Path:
     """Value as a path."""
     try:
-        text = os.fspath(value)
+        text = os.fspath(cast("str", value))
     except TypeError:
         text = None
     if not isinstance(text, str):

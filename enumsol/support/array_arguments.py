@@ -182,7 +182,7 @@ def real_matrix(value: object, name: str, *, error: type[EnumsolError] = Invalid
     return matrix
 
 
-def _from_sparse(value: Any, name: str, error: type[EnumsolError]) -> sp.csc_array:
+def _from_sparse(value: sp.sparray | sp.spmatrix, name: str, error: type[EnumsolError]) -> sp.csc_array:
     if value.ndim != 2:
         raise error(f"{name} has {value.ndim} dimension(s), shape {value.shape}; expected a matrix")
     if value.dtype.kind == "c":
@@ -207,7 +207,9 @@ def _from_sparse(value: Any, name: str, error: type[EnumsolError]) -> sp.csc_arr
     return matrix
 
 
-def _triplets(value: Any, name: str, error: type[EnumsolError]) -> tuple[NDArray[Any], NDArray[Any], NDArray[Any]]:
+def _triplets(
+    value: sp.sparray | sp.spmatrix, name: str, error: type[EnumsolError]
+) -> tuple[NDArray[Any], NDArray[Any], NDArray[Any]]:
     """Rows, columns and entries of a sparse matrix, checked to fit together: scipy reads any address it is given."""
     try:
         if value.format in ("csr", "csc", "bsr"):

@@ -1,4 +1,4 @@
-"""The time that a call may take, and what it is at: long loops ask here for one and tell the other.
+"""The time that a call may take, what it is at, and what is kept where it is ended: long loops ask and tell here.
 
 A limit belongs to a call in its thread, whoever set it, and may move while it holds. Nothing has to be handed through
 what is between the call and the loop, and code that is called without a limit never stops. In the same way whoever
@@ -15,20 +15,16 @@ from contextvars import ContextVar, copy_context
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Protocol, TypeVar
 
+from enumsol.errors import Interrupted, OutOfMemoryError
+
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
 
     Listener = Callable[[str, int, int], object]
+    #: Types of the errors that end a call from outside.
+    Ending = type[Interrupted] | type[OutOfMemoryError]
 
 _Result = TypeVar("_Result")
-
-#: Of the time limit, and seconds besides: what may be used after it to put together what was found. A fifth and two
-#: seconds are promised; what does not look at the clock needs the rest.
-_SHARE, _SECONDS = 0.15, 1.2
-#: How often a call in a thread of its own is asked for, in seconds.
-_POLL = 0.05
-#: Sparse matrices with fewer entries are factorized in some hundredths of a second.
-_SHORT = 50_000
 
 
 class TimeOverError(Exception):
@@ -61,7 +57,8 @@ class Deadline:
         """Until when what was found may be put together: somewhat more time than the limit."""
         if self.deadline is None:
             return self
-        return Deadline(self.deadline + _SHARE * (self.deadline - started) + _SECONDS)
+        # a fifth and two seconds are promised; what does not look at the clock needs the rest
+        return Deadline(self.deadline + 0.15 * (self.deadline - started) + 1.2)
 
     def part(self, share: float) -> Deadline:
         """The end of a share of the time that is left."""
@@ -125,7 +122,7 @@ def attended(work: Callable[[], _Result], size: int, name: str, given_up: thread
     TimeOverError
         The deadline that holds here has passed.
     """
-    if size < _SHORT:
+    if size < 50_000:  # sparse matrices with fewer entries are factorized in some hundredths of a second
         return work()
     tell(name)
     done: Future[_Result] = Future()
@@ -139,7 +136,7 @@ def attended(work: Callable[[], _Result], size: int, name: str, given_up: thread
 
     try:
         threading.Thread(target=run, daemon=True).start()
-        while not wait([done], _POLL).done:
+        while not wait([done], 0.05).done:
             look()
         return done.result()
     finally:
@@ -176,3 +173,57 @@ def tell_part(part: str) -> Listener | None:
     """A listener for a part of the work, which puts the part's name behind what it hears; None where nobody listens."""
     listener = _listener.get()
     return None if listener is None else lambda work, done, of: listener(f"{work} {part}", done, of)
+
+
+def keeping(
+    name: str, work: Callable[[], _Result], rest: Callable[[Ending], _Result], said: Callable[[_Result], str]
+) -> _Result:
+    """The result of a call, or an error that holds what was found before Ctrl-C, or until there was no memory.
+
+    Python raises KeyboardInterrupt between any two instructions, also where a result is put together. So ``rest`` puts
+    it together anew, from what ``work`` left; it begins again if it is itself interrupted.
+
+    Parameters
+    ----------
+    name : str
+        Of the call, for the message.
+    work : callable
+        The call. What it sets in its context, such as deadlines, is forgotten even if it does not come to its end.
+    rest : callable
+        Gives the result of what was found so far, in a moment. It may be called several times.
+    said : callable
+        Gives the rest of the message, from the partial result.
+
+    Raises
+    ------
+    Interrupted, OutOfMemoryError
+        ``partial`` is what ``rest`` gives.
+    """
+    ending: Ending
+    try:
+        return copy_context().run(work)
+    except KeyboardInterrupt:
+        ending = Interrupted
+    except MemoryError:
+        ending = OutOfMemoryError
+    # here the error is gone, and with it what the frames of the work held
+    # somebody waits for the result: what takes longer to be put together is left out
+    end = Deadline(time.perf_counter() + 1.0)
+    # it begins again if Ctrl-C comes meanwhile: somebody may press it twice, and `timeout` sends it twice
+    for _ in range(8):
+        try:
+            partial = copy_context().run(_within, end, rest, ending)
+            message = f"{name} {ending.happened}{said(partial)}"
+            break
+        except KeyboardInterrupt:
+            continue
+        except MemoryError:
+            raise OutOfMemoryError(f"{name} {OutOfMemoryError.happened}, and nothing could be kept", None) from None
+    else:
+        raise KeyboardInterrupt
+    raise ending(message, partial)
+
+
+def _within(end: Deadline, rest: Callable[[Ending], _Result], ending: Ending) -> _Result:
+    with within(end):
+        return rest(ending)

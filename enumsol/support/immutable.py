@@ -53,11 +53,11 @@ class Sealed:
     """Base of frozen dataclasses: their arrays are immutable, also in copies and after unpickling."""
 
     def __post_init__(self) -> None:
-        self.__setstate__(self.__dict__)
+        self.__setstate__(vars(self))
 
     def __setstate__(self, state: Mapping[str, Any]) -> None:
-        # a frozen dataclass refuses setattr; arrays come out of a pickle writable
-        self.__dict__.update({name: _sealed_within(value) for name, value in state.items()})
+        for name, value in state.items():  # arrays come out of a pickle writable
+            object.__setattr__(self, name, _sealed_within(value))
 
 
 class Listed(tuple[Item, ...]):
@@ -70,22 +70,23 @@ class Listed(tuple[Item, ...]):
         What an item is called in the message.
     """
 
+    _called: tuple[str, str | None]
+
     def __new__(cls, items: Iterable[Item] = (), name: str = "item", plural: str | None = None) -> Self:
         """The tuple of these items."""
         made = super().__new__(cls, items)
-        made.__dict__.update(name=name, plural=plural)
+        made._called = name, plural
         return made
 
     @overload
     def __getitem__(self, item: SupportsIndex) -> Item: ...
     @overload
     def __getitem__(self, item: slice) -> tuple[Item, ...]: ...
-    def __getitem__(self, item: Any) -> Any:
+    def __getitem__(self, item: SupportsIndex | slice) -> Any:
         try:
             return super().__getitem__(item)
         except IndexError:
-            given: dict[str, Any] = self.__dict__
-            raise no_such_item(item, len(self), given["name"], given["plural"]) from None
+            raise no_such_item(item, len(self), *self._called) from None
 
 
 def no_such_item(item: object, count: int, name: str, plural: str | None = None) -> NoSuchItemError:
@@ -96,14 +97,14 @@ def no_such_item(item: object, count: int, name: str, plural: str | None = None)
     return NoSuchItemError(f"there is no {name} {item}: there {there} {counted(count, name, plural)}{expected}")
 
 
-class Immutable:
+class Immutable(Sealed):
     """Base of classes whose attributes are set in ``__init__``, which ends with ``self._freeze()``."""
 
     #: What to do instead of setting an attribute, for the message.
     _instead: ClassVar[str] = "make a new one"
 
     def _freeze(self) -> None:
-        self.__dict__["_frozen"] = True
+        object.__setattr__(self, "_frozen", True)
 
     def __setattr__(self, name: str, value: object) -> None:
         self._refuse(name, "set")
@@ -114,11 +115,8 @@ class Immutable:
         super().__delattr__(name)
 
     def _refuse(self, name: str, done: str) -> None:
-        if "_frozen" in self.__dict__:
+        if "_frozen" in vars(self):
             raise AttributeError(f"{type(self).__name__} is immutable: {name} cannot be {done}; {self._instead}")
-
-    def __setstate__(self, state: Mapping[str, Any]) -> None:
-        self.__dict__.update({name: _sealed_within(value) for name, value in state.items()})
 
 
 @dataclass(frozen=True, eq=False)

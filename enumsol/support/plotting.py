@@ -5,11 +5,18 @@ from __future__ import annotations
 import re
 from functools import cache
 from io import BytesIO
-from typing import Any
+from typing import TYPE_CHECKING, Any, TypeVar
 
 from enumsol.errors import InvalidArgumentError, MissingDependencyError
 from enumsol.support.arguments import file_path, shown
 from enumsol.support.files import write_file
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.backend_bases import RendererBase
+    from matplotlib.figure import Figure
+
+    FigureT = TypeVar("FigureT", bound=Figure)
 
 
 def new_figure(**options: Any) -> Any:
@@ -44,7 +51,7 @@ def _figure_class() -> Any:
             super().__init__(**options)
             FigureCanvasAgg(self)
 
-        def draw(self, renderer: Any) -> None:
+        def draw(self, renderer: RendererBase) -> None:
             # a dollar sign in a title or a name begins no formula; logarithmic axes have formulas of their own
             for text in self.findobj(Text):
                 if _LOGARITHMIC not in (said := text.get_text()) and "$" in said:
@@ -83,7 +90,7 @@ def in_units(name: str, dimension: str | None, units: tuple[str, str] | None) ->
     return f"{name} [{ {'force': force, 'length': length, 'work': f'{force} {length}'}[dimension] }]"
 
 
-def axes_of(ax: Any, figsize: tuple[float, float]) -> Any:
+def axes_of(ax: object, figsize: tuple[float, float]) -> Any:
     """The axes that a picture is drawn into: those given, or those of a new figure [inches].
 
     Raises
@@ -94,7 +101,7 @@ def axes_of(ax: Any, figsize: tuple[float, float]) -> Any:
     return new_figure(figsize=figsize).add_subplot() if axes_or_none(ax) is None else ax
 
 
-def plain_axes(axis: Any) -> None:
+def plain_axes(axis: Axes) -> None:
     """A light grid behind what is drawn, and lines on the left and below only."""
     axis.grid(visible=True, color="#e4e4e4", linewidth=0.6)
     axis.set_axisbelow(True)
@@ -115,12 +122,12 @@ def area_entry(label: str, **look: Any) -> Any:
     return Patch(label=label, **look)
 
 
-def figure_of(ax: Any) -> Any:
+def figure_of(ax: Axes) -> Any:
     """The whole figure that axes belong to, through subfigures."""
     return ax.figure.canvas.figure
 
 
-def kept(figure: Any, file: Any) -> Any:
+def kept(figure: FigureT, file: object) -> FigureT:
     """The figure, written to a file as well if one is given.
 
     Raises

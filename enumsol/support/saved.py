@@ -1,4 +1,4 @@
-"""What stands in files, within bounds: JSON, TOML, tables, archives of arrays, and the kinds of what was saved.
+"""Contents of files, within bounds: JSON, TOML, tables, archives of arrays, and the kinds of what was saved.
 
 A file may hold anything. What it says of its size is compared with its bytes before memory is asked for. All functions
 raise ValueError, which those who read a file turn into a sentence about it (``support.files.reading``).
@@ -9,10 +9,11 @@ from __future__ import annotations
 import io
 import json
 import math
+import os
 import re
 import tomllib
 import zipfile
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import IO, Any
@@ -24,15 +25,8 @@ from enumsol.support.arguments import shown
 #: Most bytes of a JSON file, which become some twenty times as many in memory, and of a TOML file, which has a
 #: thousandth of that where it describes a problem.
 LARGEST_JSON, LARGEST_TOML = 1 << 30, 1_000_000
-#: Most digits of a whole number in a JSON file; float64 goes to 309.
-_MOST_DIGITS = 300
 #: Most columns of a table; with two a contact node enough for any body.
 MOST_COLUMNS = 100_000
-#: Most times that a byte of a compressed file may stand for: the limit of deflate.
-_DEFLATE = 1032
-#: Beyond so many bytes an archive may not be more than _DENSE times as large as its file: what compresses further is
-#: made to be expanded, or is better kept in sparse parts.
-_LARGE, _DENSE = 1 << 31, 200
 #: A key of TOML of so many parts, for which Python's parser takes a time that grows with the cube of their number.
 _LONG_KEY = re.compile(r"""(?<![\w-])(?:(?:[\w-]++|"[^"\n]*+"|'[^'\n]*+')[ \t]*+\.[ \t]*+){64}""", re.ASCII)
 
@@ -65,9 +59,9 @@ def toml_from(content: bytes) -> dict[str, Any]:
         raise ValueError("it is nested too deeply") from None
 
 
-def table_text(source: Any) -> IO[str]:
+def table_text(source: str | os.PathLike[str] | IO[Any]) -> IO[str]:
     """The text of a table, from the name of a CSV file or from an open one; very many columns are refused."""
-    content = source.read() if hasattr(source, "read") else Path(source).read_bytes()
+    content = Path(source).read_bytes() if isinstance(source, (str, os.PathLike)) else source.read()
     text = content.decode("utf-8-sig") if isinstance(content, bytes) else content
     columns = 1 + max((line.count(",") for line in text.splitlines()), default=0)
     if columns > MOST_COLUMNS:
@@ -76,7 +70,7 @@ def table_text(source: Any) -> IO[str]:
 
 
 def _whole(text: str) -> int:
-    if len(text) > _MOST_DIGITS:
+    if len(text) > 300:  # float64 goes to 309
         raise ValueError(f"a whole number in it has {len(text)} digits")
     return int(text)
 
@@ -137,8 +131,12 @@ def _is_pickled(member: zipfile.ZipInfo, content: IO[bytes]) -> bool:
 
 
 def check_size(name: str, size: int, stored: int) -> None:
-    """Refuse what claims to be so many bytes, and cannot be, or should not, by those that are stored of it."""
-    if size > _DEFLATE * stored + (1 << 12) or (size > _LARGE and size > _DENSE * stored):
+    """Refuse what claims to be so many bytes, and cannot be, or should not, by those that are stored of it.
+
+    A byte of deflate stands for 1032 at most. What is large and compresses further than 200 times is made to be
+    expanded, or is better kept in sparse parts.
+    """
+    if size > 1032 * stored + (1 << 12) or (size > 1 << 31 and size > 200 * stored):
         raise ValueError(f"{name} stands for {size} bytes, of which {stored} are stored")
 
 
@@ -156,7 +154,7 @@ def check_shape(name: str, shape: Iterable[int], room: int) -> None:
 class Maybe:
     """A value of this kind, or none."""
 
-    kind: Any
+    kind: Kind
 
 
 class Array:
@@ -165,7 +163,7 @@ class Array:
     def __init__(self, *shape: int | None) -> None:
         self.shape = shape
 
-    def fits(self, value: object) -> bool:
+    def __call__(self, value: object) -> bool:
         """True if a value is such an array."""
         if isinstance(value, (list, np.ndarray)):
             array = np.asarray(value)  # ValueError where lists have different lengths
@@ -178,6 +176,8 @@ class Array:
         return False
 
 
+#: Kinds of values, see `check_kind`.
+Kind = type | set[str] | range | Maybe | Array | list[Any] | tuple[Any, ...] | dict[str, Any] | Callable[[Any], bool]
 _FRACTION = re.compile(r"-?[0-9]{1,4300}(/0*[1-9][0-9]{0,4299})?", re.ASCII)
 
 
@@ -196,7 +196,7 @@ def is_label(value: object) -> bool:
     return type(value) in (int, float, str)
 
 
-def check_kind(value: Any, kind: Any, where: str) -> None:
+def check_kind(value: Any, kind: Kind, where: str) -> None:
     """Refuse a value of a saved structure that is of another kind than what is written there.
 
     Parameters
@@ -236,8 +236,6 @@ def check_kind(value: Any, kind: Any, where: str) -> None:
             fits = type(value) is str and value in kind
         case range():
             fits = type(value) is int and value in kind
-        case Array():
-            fits = kind.fits(value)
         case type():
             fits = is_number(value) and -math.inf < value < math.inf if kind is float else type(value) is kind
         case _:

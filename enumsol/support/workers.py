@@ -1,4 +1,4 @@
-"""Tasks for the workers of a concurrent.futures executor; if a worker dies, only time is lost.
+"""Tasks for the workers of a concurrent.futures executor, and a pool of processes; if a worker dies, only time is lost.
 
 Executors report a lost worker in many ways: BrokenProcessPool, dask's KilledWorker, a cancelled future. An error that a
 task here raises itself comes back in an `_OwnError`; any other error in a future was raised by the executor.
@@ -6,18 +6,27 @@ task here raises itself comes back in an `_OwnError`; any other error in a futur
 
 from __future__ import annotations
 
+import multiprocessing
+import os
+import signal
+import threading
+import time
 import warnings
 from collections import deque
 from concurrent.futures import BrokenExecutor, CancelledError, Executor, Future
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass
+from multiprocessing.connection import Connection, wait as wait_for
 from queue import Empty, SimpleQueue
 from typing import TYPE_CHECKING, Any, TypeVar
 
 from enumsol.errors import InvalidArgumentError
+from enumsol.support.deadlines import heard_by, listening
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Generator, Iterator
+
+    from enumsol.support.deadlines import Listener
 
     #: A key, a function that other processes can import, and its arguments.
     Call = tuple["Key", Callable[..., Any], tuple[Any, ...]]
@@ -25,10 +34,8 @@ if TYPE_CHECKING:
 Key = TypeVar("Key")
 #: Characters of an executor's own message that are passed on.
 _LONGEST = 160
-#: How often a task is handed to workers before it is done by the calling process, and a pool made anew.
-_TRIES, _RENEWALS = 3, 20
-#: Tasks handed out at a time, for each worker; where their number is not known, for all.
-_AHEAD, _MANY = 4, 64
+#: A task of a pool tells what it is at once it has taken so long, and no more often than this [seconds].
+_QUIET, _PAUSE = 2.0, 1.0
 #: Seconds that a broken pool has to end the tasks that it was handed; it forgets one that comes while it breaks.
 _PATIENCE = 1.0
 
@@ -72,7 +79,7 @@ class Crew:
     def room(self) -> int:
         """Number of further tasks that should be handed out: enough to keep all workers busy."""
         workers = getattr(self._executor, "_max_workers", None)
-        most = _AHEAD * workers if isinstance(workers, int) else _MANY
+        most = 4 * workers if isinstance(workers, int) else 64
         return most - len(self._out) - len(self._here)
 
     def submit(self, function: Callable[..., Any], *arguments: Any) -> Job:
@@ -130,7 +137,7 @@ class Crew:
         self._hand_out(job)
 
     def _hand_out(self, job: Job) -> None:
-        while self._executor is not None and job.tries < _TRIES:
+        while self._executor is not None and job.tries < 3:  # then it is done by the calling process
             try:
                 future = _submitted(self._executor, job)
             except _Lost as loss:
@@ -158,7 +165,7 @@ class Crew:
         """True if there are new workers in the place of a broken pool."""
         renew = getattr(self._executor, "renew", None)
         self._renewals += 1
-        if renew is None or self._renewals > _RENEWALS:
+        if renew is None or self._renewals > 20:
             return False
         try:
             renew()
@@ -249,6 +256,135 @@ def _one_line(error: BaseException) -> str:
     return text if len(text) <= _LONGEST else f"{type(error).__name__}, {text[:_LONGEST]} ..."
 
 
+# -- a pool -----------------------------------------------------------------------------------------------------------
+
+
+class RenewedPool(Executor):
+    """The processes of ``jobs=`` and ``--jobs``: a pool of loky that can be made anew (see `Crew`).
+
+    Parameters
+    ----------
+    jobs : int
+        Number of processes.
+    """
+
+    def __init__(self, jobs: int) -> None:
+        self._max_workers = jobs
+        self._pool: Any = None
+        #: What workers tell, and who hears it: whoever listened when the last task was submitted.
+        self._told, self._channel = multiprocessing.Pipe(duplex=False)
+        self._listener: Listener | None = None
+        threading.Thread(target=self._hear, daemon=True).start()
+
+    def renew(self) -> None:
+        """Start the processes, in the place of those that were there.
+
+        Raises
+        ------
+        OSError
+            The system starts no more processes.
+        """
+        import loky  # takes a while
+
+        self.shutdown()
+        before = set(multiprocessing.active_children())
+        with _ignoring_interrupts():
+            # spawned, not forked: a progress bar runs in a thread of its own
+            context = multiprocessing.get_context("spawn")
+            self._pool = loky.ProcessPoolExecutor(
+                self._max_workers, context=context, initializer=_begin, initargs=(self._channel,)
+            )
+            try:
+                self._pool.submit(int)  # all start with the first task
+            except BrokenExecutor:
+                pass  # that one died already the search finds out
+            except OSError:
+                for process in set(multiprocessing.active_children()) - before:  # loky does not end these
+                    process.kill()
+                    process.join()
+                raise
+
+    def submit(self, function: Callable[..., Any], /, *arguments: Any, **named: Any) -> Future[Any]:
+        """The future of a call.
+
+        Raises
+        ------
+        BrokenExecutor
+            A process died; `renew` starts others.
+        """
+        if self._pool is None:
+            raise BrokenExecutor("there are no processes")
+        self._listener = listening()
+        future: Future[Any] = self._pool.submit(_telling, function, *arguments, **named)
+        return future
+
+    def _hear(self) -> None:
+        """Pass on what workers tell, so that their pipe never fills, until the pool is shut down."""
+        while (message := self._told.recv()) is not None:
+            listener = self._listener
+            if listener is not None:
+                listener(*message)
+        self._told.close()
+
+    def __exit__(self, *error: object) -> None:
+        """Shut down for good."""
+        self.shutdown()
+        self._listener = None
+        self._channel.send(None)
+        self._channel.close()
+
+    def shutdown(self, wait: bool = True, *, cancel_futures: bool = True) -> None:
+        """End the processes at once, whatever they do."""
+        if self._pool is not None:
+            self._pool.shutdown(wait, kill_workers=True)
+            self._pool = None
+
+
+#: In a worker: where it tells what it is at.
+_to_parent: list[Connection] = []
+
+
+def _begin(channel: Connection) -> None:
+    """In a worker: tell the process that started it, and do not outlive it, which may be killed."""
+    _to_parent.append(channel)
+    parent = multiprocessing.parent_process()
+    if parent is not None:
+        threading.Thread(target=_wait_and_end, args=(parent.sentinel,), daemon=True).start()
+
+
+def _telling(function: Callable[..., Any], *arguments: Any, **named: Any) -> Any:
+    """In a worker: a task, which tells what it is at if it takes long."""
+    due = [time.monotonic() + _QUIET]
+
+    def told(work: str, done: int, of: int) -> None:
+        if time.monotonic() >= due[0]:
+            due[0] = time.monotonic() + _PAUSE
+            with suppress(OSError):  # the process that listened has ended
+                # short: a message is written to the pipe in one piece
+                _to_parent[0].send((f"{work[:200]} in a worker", done, of))
+
+    with heard_by(told if _to_parent else None):
+        return function(*arguments, **named)
+
+
+def _wait_and_end(sentinel: int) -> None:
+    wait_for([sentinel])
+    os._exit(1)
+
+
+@contextmanager
+def _ignoring_interrupts() -> Iterator[None]:
+    """A terminal sends Ctrl-C to the workers too: processes born while it is ignored go on ignoring it."""
+    if threading.current_thread() is not threading.main_thread():
+        yield  # no other thread may change what a signal does
+        return
+    handler = signal.signal(signal.SIGINT, signal.SIG_IGN)
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGINT, handler)
+
+
 @contextmanager
 def workers_of(executor: Executor | None, jobs: int | None, name: str = "jobs") -> Iterator[Executor | None]:
     """The executor that is given, or one of that many processes, ended at once on the way out; None for one job.
@@ -261,8 +397,6 @@ def workers_of(executor: Executor | None, jobs: int | None, name: str = "jobs") 
     if jobs is None or jobs == 1:
         yield executor
         return
-    from enumsol.support.pool import RenewedPool  # loky: only for several processes
-
     with RenewedPool(jobs) as pool:
         try:
             pool.renew()

@@ -31,7 +31,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
 
     from enumsol.condensation.enclosure import EnclosedSystem
-    from enumsol.support.array_types import Floats
+    from enumsol.support.array_types import Codes, Floats
 
 
 @dataclass(frozen=True)
@@ -104,8 +104,8 @@ class Unsettled:
 
 def settled_selection(
     system: EnclosedSystem,
-    codes: Sequence[int],
-    precisely: Callable[[Sequence[int]], VerifiedSelection | None] = lambda _: None,
+    codes: Codes,
+    precisely: Callable[[Codes], VerifiedSelection | None] = lambda _: None,
 ) -> VerifiedSelection | Unsettled | None:
     """The root of a complete selection, None where it holds none, or that this is open.
 
@@ -123,12 +123,12 @@ def settled_selection(
 
 
 def holds_no_root(system: EnclosedSystem, codes: Sequence[int], ball: VerifiedSelection | None) -> bool:
-    """Whether a complete selection is proven to hold no root; ``ball`` is its verified solution, if it has one."""
+    """True if a complete selection is proven to hold no root; ``ball`` is its verified solution, if it has one."""
     return (ball is not None and ball.is_excluded) or contradicts(system, codes)
 
 
 def contradicts(system: EnclosedSystem, codes: Sequence[int]) -> bool:
-    """Whether the equations M z = b of a complete selection are proven to hold for no forces that a root can have.
+    """True if the equations M z = b of a complete selection are proven to hold for no forces that a root can have.
 
     At a root lambda' S lambda <= g' lambda, so that ||z|| <= ||lambda|| <= ||g|| / mu with mu the smallest eigenvalue
     of S; of a body that nothing holds theory, (14.5), bounds the unknowns. Any vector y for which |y'b| is more than

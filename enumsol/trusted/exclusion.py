@@ -30,7 +30,6 @@ from enumsol.trusted.status_rows import FORBIDDEN, NONNEGATIVE, ROW_KINDS, row_s
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from enumsol.condensation.enclosure import EnclosedSystem
     from enumsol.support.array_types import Floats, Indices, NDArray
 
 

@@ -1,11 +1,11 @@
-"""The trusted test that several selections share one root, whichever of them it is in (theory, section 14.9)."""
+"""The trusted test that several selections share one root (theory, section 14.9), and lists of roots of leaves."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
 from itertools import product
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Generic, NamedTuple, TypeVar
 
 import numpy as np
 
@@ -14,8 +14,11 @@ from enumsol.trusted.at_alpha import VerifiedSelection, solve_selection
 from enumsol.trusted.status_rows import CONDITIONS, SLIP_MINUS, SLIP_PLUS, STICK
 
 if TYPE_CHECKING:
+    from collections.abc import Callable, Iterable, Sequence
+
     from enumsol.condensation.enclosure import EnclosedSystem
     from enumsol.support.array_types import Codes
+
 
 #: Nodes between stick and slip at most: there are twice as many selections for each.
 MOST_BETWEEN = 8
@@ -81,3 +84,45 @@ def joint_root(system: EnclosedSystem, core: Codes, slips: Mapping[int, int]) ->
     force, w = (hull([getattr(ball, name) for ball in balls]) for name in ("force", "w"))
     rigid = [ball.rigid for ball in balls if ball.rigid is not None]
     return JointRoot(core, possible, force, w, balls[0].index, hull(rigid) if rigid else None)
+
+
+Leaf = TypeVar("Leaf")
+
+
+class Apart(NamedTuple, Generic[Leaf]):
+    """Leaves by the roots that they hold.
+
+    Attributes
+    ----------
+    kept : one leaf of every root
+    doubtful : those of them whose root may be that of another one
+    same : every other leaf, with one whose root is proven to be its own
+    """
+
+    kept: list[Leaf]
+    doubtful: list[Leaf]
+    same: list[tuple[Leaf, Leaf]]
+
+
+def told_apart(
+    found: Iterable[Leaf], same: Callable[[Leaf, Leaf], bool | None], known: Sequence[Leaf] = ()
+) -> Apart[Leaf]:
+    """Leaves by the roots that they hold, without those whose roots are among known ones.
+
+    Parameters
+    ----------
+    found : leaves with one root each
+    same : whether the roots of two leaves, the earlier one first, are one for all data in their balls; None: open
+    known : leaves whose roots are different
+    """
+    apart: Apart[Leaf] = Apart([], [], [])
+    for one in found:
+        others = [*known, *apart.kept]
+        answers = [same(other, one) for other in others]
+        if True in answers:
+            apart.same.append((one, others[answers.index(True)]))
+            continue
+        if None in answers:
+            apart.doubtful.append(one)
+        apart.kept.append(one)
+    return apart

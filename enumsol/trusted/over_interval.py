@@ -1,4 +1,4 @@
-"""What exclusions over an interval of alpha are proven with (theory, section 7.9).
+"""Data and forms of exclusions over an interval of alpha (theory, section 7.9).
 
 With fixed multipliers the dual bound is concave in alpha: constraint normals are constant (friction enters by its
 extreme values) and right-hand sides affine. Positive at both ends, it is positive in between, and a partial assignment
@@ -20,6 +20,7 @@ from enumsol.arithmetic.balls import SAFE, TINY, UNIT, Ball, factor_above, gamma
 from enumsol.condensation.enclosure import CondensedEnclosure, EnclosedSystem
 from enumsol.trusted.quadratic_forms import EnclosedForm
 from enumsol.trusted.status_rows import BACKWARD, FORWARD, ROW_KINDS, STILL, UNDECIDED, row_table
+from enumsol.trusted.uniqueness_forms import Multipliers
 
 if TYPE_CHECKING:
     from enumsol.model.problem import ContactProblem
@@ -141,28 +142,11 @@ class PieceNumbers:
         """True if ``|nu| F <= mu`` for all coefficients up to these."""
         return not np.any(np.abs(self.nu) * largest * SAFE + TINY > self.mu)
 
-    def form(self, S: Ball, theta: Ball) -> Ball:
-        """D'S, of which (6.9) is the symmetric part."""
+    def multipliers(self, theta: Ball) -> Multipliers:
+        """D of (6.9) for a theta of every node."""
         p = len(self.mu)
-        along = S[:p] * Ball.exact(self.mu[:, None])
-        turned = (theta * Ball.exact(self.kappa))[:, None]
-        across = S[:p] * Ball.exact(self.nu[:, None]) + S[p:] * Ball.exact(self.kappa[:, None])
-        along = along - S[p:] * turned
-        return Ball.joined(along, across)
-
-    def taken(self, S: Ball, off: Floats) -> Ball:
-        """What a theta that is off by so much takes from the form at most (theory, (7.18))."""
-        p = len(self.mu)
-        nodes = np.flatnonzero(off > 0)
-        length = upper_norm(S[p + nodes].size, axis=1)
-        weight = self.kappa[nodes] * off[nodes] * SAFE
-        # weights at least kappa rho / |r|, for any rounding
-        T = S[p + nodes] * Ball.exact((np.sqrt(weight / length) * SAFE + TINY)[:, None])
-        square = T.T @ T
-        taken = Ball(0.5 * square.mid, 0.5 * square.rad)
-        taken.mid[nodes, nodes] += 0.5 * weight * length * SAFE
-        taken.rad[nodes, nodes] += 4 * UNIT * taken.mid[nodes, nodes]
-        return taken
+        places, unit = p + np.arange(p)[:, None], np.ones((p, 1))
+        return Multipliers(places, self.mu, self.kappa, theta[:, None], Ball.exact(self.nu[:, None]), unit)
 
 
 def definite(form: Ball, margin: float) -> bool:

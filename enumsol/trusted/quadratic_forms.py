@@ -97,7 +97,7 @@ class QuadraticForm:
 
     @cached_property
     def inverse(self) -> Floats:
-        """Approximate inverse of H; no claim rests on its accuracy."""
+        """Approximate inverse of H; bounds hold however accurate it is."""
         return np.asarray(np.linalg.inv(self.H))
 
     @cached_property

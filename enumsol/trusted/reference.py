@@ -7,19 +7,18 @@ from typing import TYPE_CHECKING, Self
 
 import numpy as np
 
-from enumsol.arithmetic.balls import SAFE, TINY, Ball
+from enumsol.arithmetic.balls import Ball
 from enumsol.trusted.at_alpha import VerifiedSelection, solve_selection
-from enumsol.trusted.root_forms import Body, Multipliers, RootForm, less, plus, times
 from enumsol.trusted.selection import PENETRATION, SLIP_BACKWARD, SLIP_FORWARD, Unknowns
 from enumsol.trusted.status_rows import FREE, NONNEGATIVE, OPEN, final_codes, refines, row_signs
-from enumsol.trusted.uniqueness_weights import Components, Weights
+from enumsol.trusted.uniqueness import Components, Weights
+from enumsol.trusted.uniqueness_forms import RootForm, RootReference
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from enumsol.condensation.enclosure import EnclosedSystem
     from enumsol.support.array_types import Codes, Floats
-    from enumsol.trusted.root_forms import Product
 
 #: Rows on displacements, and their signs in w.
 _SIGNS = {PENETRATION: -1.0, SLIP_FORWARD: 1.0, SLIP_BACKWARD: -1.0}
@@ -27,24 +26,18 @@ _OPPOSITE = {SLIP_FORWARD: SLIP_BACKWARD, SLIP_BACKWARD: SLIP_FORWARD}
 
 
 @dataclass(frozen=True)
-class Reference:
-    """A strict root of a selection, and its form.
+class Reference(RootReference[int]):
+    """The strict root of a selection, and its form.
 
     Attributes
     ----------
-    system : EnclosedSystem
-    selection : final codes
     root : VerifiedSelection
     at : Unknowns
         Which components d has: lambda_n of all nodes, lambda_t of those with friction.
-    form : RootForm
     """
 
-    system: EnclosedSystem
-    selection: Codes
     root: VerifiedSelection
     at: Unknowns
-    form: RootForm
 
     @classmethod
     def of(cls, system: EnclosedSystem, selection: Codes, weights: Floats, balance: float, share: float) -> Self | None:
@@ -68,39 +61,22 @@ class Reference:
             if root is None or not root.is_root:
                 return None
             at = Unknowns(system.p, np.arange(system.p), friction, np.zeros(system.p, dtype=np.intp))
-            body = Body(Ball(system.S, system.S_rad)[np.ix_(at.places, at.places)], system.rows.G[:, at.places])
-            part = Components(system, tuple(selection), at, body.S)
+            S, G = Ball(system.S, system.S_rad)[np.ix_(at.places, at.places)], system.rows.G[:, at.places]
+            part = Components(system, tuple(selection), at, S)
             numbers = Weights.of(part, np.concatenate([weights, np.zeros(len(at.normal))]))
             if numbers is None:
                 return None
-            numbers = numbers.beside(root.force[at.places], at.tangential[at.normal])
-            multipliers = _multipliers(part, numbers, root, _cross(body.G, numbers, at, share))
-            form = RootForm.of(body, multipliers, balance) if np.all(np.isfinite(multipliers.lost)) else None
-            return None if form is None else cls(system, tuple(selection), root, at, form)
+            x, w = root.force[at.places], root.w[at.places]
+            numbers = numbers.beside(x, at.tangential[at.normal])
+            loaded = x, np.array(selection) != OPEN
+            form = RootForm.of(S, G, numbers.multipliers(at), numbers.distances(at, x, w), loaded, balance, share)
+            return None if form is None else cls(system, tuple(selection), form, root, at)
 
     def lies_below(self, codes: Sequence[int]) -> bool:
         """True if the root has the statuses of an assignment."""
         return all(refines(own, code) for own, code in zip(self.selection, codes, strict=True))
 
-    def is_only_root(
-        self, codes: Sequence[int], rows: Sequence[int], products: Sequence[Product], reach: Floats
-    ) -> bool:
-        """True if every root below an assignment, with |q| within reach, is this one.
-
-        Parameters
-        ----------
-        codes : status codes
-        rows : rows on displacements that are equations below the assignment and at the root
-        products : pairs of rows that are nonnegative below the assignment and not positive at the root, and a factor
-        reach : (r,) array, bounds of q, may be infinite
-        """
-        tight = sorted({row for one, other, _ in products for row in (one, other)})
-        if not self._allow(codes, rows, tight) or not all(0 < factor < np.inf for *_, factor in products):
-            return False
-        numbered = [(tight.index(one), tight.index(other), factor) for one, other, factor in products]
-        return self.form.is_only_root(self.rows(rows), self.rows(tight), numbered, reach)
-
-    def _allow(self, codes: Sequence[int], rows: Sequence[int], tight: Sequence[int]) -> bool:
+    def allow(self, codes: Sequence[int], rows: Sequence[int], tight: Sequence[int]) -> bool:
         """True if the first rows are equations, and the others nonnegative but not positive at the root."""
         p, F = self.system.p, self.system.F
         signs, own = (row_signs(np.array(given), F) for given in (codes, self.selection))
@@ -124,29 +100,3 @@ class Reference:
             kind, node = divmod(row, self.system.p)
             found[k, node if kind == PENETRATION else self.at.tangential[node]] = _SIGNS[kind]
         return Ball.exact(found)
-
-
-def _multipliers(part: Components, numbers: Weights, root: VerifiedSelection, cross: Ball) -> Multipliers:
-    at, p = part.at, part.system.p
-    x, w = root.force[at.places], root.w[at.places]
-    lost, cost = np.zeros(len(at.places)), np.zeros(len(at.places))
-    for k, n in enumerate(at.normal):
-        t = at.tangential[n]
-        off = numbers.off(k, x[n], x[t], w[n], w[t])
-        lost[t] = 0.0 if off == 0 else numbers.kappa[k] * off * SAFE + TINY
-    nu = np.zeros(p)
-    nu[at.normal] = numbers.nu
-    price = Ball.exact(numbers.mu) * root.force[:p] + Ball.exact(nu) * root.force[p : 2 * p]
-    loaded = np.array(part.selection) != OPEN
-    cost[:p] = np.where(loaded, np.maximum(price.low / SAFE, 0.0), 0.0)
-    return Multipliers(part.form(numbers), cross, lost, cost)
-
-
-def _cross(G: Ball, numbers: Weights, at: Unknowns, share: float) -> Ball:
-    """C = -G (D - c), without radius where nothing is left of it."""
-    n, t, m = at.normal, at.tangential[at.normal], len(at.nodes)
-    C = Ball.exact(np.zeros(G.shape))
-    C[:, :m] = times(G[:, :m], less(share, numbers.mu))
-    C[:, n] = plus(C[:, n], times(times(G[:, t], numbers.slope), Ball.exact(numbers.kappa)))
-    C[:, t] = plus(times(G[:, n], Ball.exact(-numbers.nu)), times(G[:, t], less(share, numbers.kappa)))
-    return C

@@ -22,7 +22,7 @@ BOUND_PLUS, BOUND_MINUS = 9, 10
 
 
 class Selection:
-    """Which forces of a selection are unknown, its equations, and what has to be nonnegative.
+    """Unknown forces of a selection, its equations, and the conditions that have to be nonnegative.
 
     Arrays of S, F, g and y may hold floats, exact numbers (dtype object) or be a Ball.
 

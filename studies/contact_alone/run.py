@@ -66,7 +66,7 @@ def row(name: str, most: int) -> dict[str, Any]:
     search = partial(enumsol.enumerate_roots, problem, 0, max_nodes=most)
     roots, seconds = timed(search)
     checked, verified = timed(enumsol.verify, problem, roots.proof)
-    with patch("enumsol.search.floating_solvers.LeadingCloser", lambda *_: TreeCloser()):
+    with patch("enumsol.search.solvers.LeadingCloser", lambda *_: TreeCloser()):
         alone, without = timed(search)
     assert checked
     assert not (roots.complete and alone.complete) or len(roots) == len(alone)

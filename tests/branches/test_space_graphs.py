@@ -36,12 +36,13 @@ from enumsol.branches.space.chains import chain_through
 from enumsol.branches.space.make_curved import unordered
 from enumsol.branches.space.pieces import runs_and_turns
 from enumsol.continuation.path_data import PathStatus
+from enumsol.search.space.curve_proposals import border_of_zeta, curve_point, placed, unplaced
 from enumsol.support.deadlines import TimeOverError, within
 from enumsol.trusted.space.curve_chains import CurveChain
 from enumsol.trusted.space.curve_events import CurveMotion
 from enumsol.trusted.space.curve_parts import Run, Turn, orders
 from enumsol.trusted.space.sector_rows import OPEN, STICK
-from enumsol.trusted.space.solution_curve import SLIP, AlphaProblem, curve_point
+from enumsol.trusted.space.solution_curve import SLIP, AlphaProblem
 
 #: SLIDING sticks as soon as alpha is the length of (3/2, 1).
 STUCK = sqrt(3.25)
@@ -452,7 +453,7 @@ def test_motion_is_that_of_differences(sliding):
         alpha, border = joint.at(0.0).mid[-1], np.array([0.0, 0.0, 0.0, 1.0])
         speed = CurveMotion(given, joint, border).speed((SLIP,))
         step = 1e-5
-        there, here = (given.placed(np.append(sliding_node(a), a)) for a in (alpha + step, alpha - step))
+        there, here = (placed(given, np.append(sliding_node(a), a)) for a in (alpha + step, alpha - step))
         assert speed.mid[:3] * given.force == pytest.approx((there - here)[:3] / (2 * step), abs=1e-8)
         assert np.all(speed.rad < 1e-6)
         assert speed.mid[3] == pytest.approx(1.0)
@@ -468,7 +469,7 @@ def test_second_derivatives_are_those_of_differences(sliding, row):
     steps = np.array([-1e-3, 0.0, 1e-3])
     force = np.array([sliding_node(alpha + s)[1 + row] for s in steps])
     first = np.polyfit(force - force[1], steps, 2)
-    border = given.border_of_zeta(border)
+    border = border_of_zeta(given, border)
     assert np.sign(first[0]) == CurveMotion(given, joint, border).bends((SLIP,))
     assert CurveMotion(given, joint, border).speed((SLIP,)).mid[3] == pytest.approx(first[1], rel=1e-4)
 
@@ -536,7 +537,7 @@ def test_both_nodes_of_a_symmetric_wedge_change_their_status_at_one_fold():
     corner = next(link.curve for link in chain.links if None in link.curve.statuses)
     point = curve_point(given, corner.at(0.0).mid, corner.box.border)
     assert corner.holds(Ball.exact(point.x))
-    assert not corner.holds(Ball.exact(point.x + 0.1 * given.unplaced(point.x)))
+    assert not corner.holds(Ball.exact(point.x + 0.1 * unplaced(given, point.x)))
     away = Fraction(1, 10**5)
     counts = [len(enumsol.enumerate_roots(problem, alpha)) for alpha in (low - away, high + away)]
     assert counts == [1, 3]

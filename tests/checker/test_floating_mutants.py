@@ -33,7 +33,8 @@ from enumsol.model import sectors
 from enumsol.model.sectors import SECTORS, nearest
 from enumsol.trusted.exclusion import exclusion_margin
 from enumsol.trusted.space import sector_rows as sr
-from enumsol.trusted.space.resultants import floating_margin, is_unbalanced_in_space
+from enumsol.trusted.space.resultants import is_unbalanced_in_space
+from enumsol.trusted.space.sector_margins import space_margin
 from enumsol.trusted.status_rows import FORBIDDEN, FREE, row_signs
 
 
@@ -258,10 +259,10 @@ def test_no_multipliers_exclude_a_solution():
 
 def _proposals(problem):
     """Multipliers that the relaxation of a selection ends with, times some factors."""
-    from enumsol.search.floating_solvers import FloatingSolvers
+    from enumsol.search.solvers import Solvers
     from enumsol.search.splitting import ImposedRows, PlaneSplitting
 
-    solvers = FloatingSolvers(problem, 0, "verified", 1e-9)
+    solvers = Solvers(problem, 0, "verified", 1e-9)
     rows = ImposedRows(PlaneSplitting(solvers.scaled.F), problem.p)
 
     def best(codes):
@@ -310,7 +311,7 @@ def test_what_holds_a_solution_is_not_excluded():
                 values = scale * rng.normal(size=len(rows))
                 values = np.where(np.array(signs) == sr.NONNEGATIVE, np.abs(values), values)
                 for within in (system, free):
-                    assert not floating_margin(within, codes, rows, values) > 0
+                    assert not space_margin(within, codes, rows, values) > 0
             for z in rng.normal(size=(10, len(system.reach))):
                 assert not is_unbalanced_in_space(system, codes, z)
             tried += 1

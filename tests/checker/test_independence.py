@@ -25,8 +25,8 @@ def inside(room, *modules):
 CHECKERS = inside("checker", "verify", "plane_checker", "graph_checker", "history_checker", "space_graph")
 IN_SPACE = {
     *("enumsol.checker.space_checker", "enumsol.condensation.space_condensed", "enumsol.model.sectors"),
-    *inside("trusted.space", "resultants", "sector_rows", "leaves", "boxed_solution"),
-    *inside("trusted.space", "product_forms", "natural_map", "space_uniqueness", "turning"),
+    *inside("trusted.space", "resultants", "sector_margins", "sector_rows", "leaves", "boxed_solution"),
+    *inside("trusted.space", "product_forms", "natural_map", "krawczyk", "space_uniqueness", "turning"),
     *inside("trusted.space", "leaf_conditions", "leaf_equations"),
 }
 #: The search: its rooms, and what it alone uses of rooms that it shares with the checkers.
@@ -52,9 +52,8 @@ SHARED = {
     "trusted.arcs.only_branch": {"only_roots"},
     "trusted.arcs.selection_balls": None,
     "trusted.exclusion": {"Terms", "exclusion_margin"},
-    "trusted.floating_bounds": {"is_unbalanced"},
-    "trusted.joint_roots": {"JointRoot", "joint_root"},
-    "trusted.confinement": {"motion_against", "motion_beside", "without_bound"},
+    "trusted.joint_roots": {"JointRoot"},
+    "trusted.floating_bounds": {"is_unbalanced", "motion_against", "motion_beside", "without_bound"},
     "trusted.arcs.many_digits": {"affordable", "ball_of", "precision"},
     "trusted.arcs.over_parts": None,
     "trusted.over_interval": {"EnclosedPiece", "PieceNumbers", "as_computed"},
@@ -63,35 +62,31 @@ SHARED = {
     "trusted.positions": {"certain_statuses", "tangential_positions"},
     "trusted.reference": {"Reference"},
     "trusted.selection": None,
-    "trusted.uniqueness": {
-        *("ClosedSolution", "closed_solution", "lone_root", "numbers_of", "only_solution", "same_solution")
-    },
-    "trusted.at_alpha": {"VerifiedSelection", "holds_no_root", "solve_selection"},
+    "trusted.uniqueness": {*("ClosedSolution", "closed_solution", "numbers_of", "only_solution", "same_solution")},
+    "trusted.at_alpha": {"VerifiedSelection", "settled_selection", "solve_selection"},
     "trusted.precise_at_alpha": {"PreciseAtAlpha"},
-    "trusted.quadratic_forms": {"EnclosedForm", "Equations"},
+    "trusted.quadratic_forms": {"EnclosedForm", "Equations", "QuadraticForm"},
     "trusted.status_rows": None,
+    "trusted.space.sector_margins": {"SlipForm"},
     "trusted.space.sector_rows": None,
-    "trusted.space.slip_forms": {"SlipForm"},
-    "trusted.space.leaf_arcs": {"LeafArc"},
     "trusted.space.leaf_equations": {"with_free_bounds"},
     "trusted.space.leaves": None,
     "trusted.space.resultants": None,
-    "trusted.space.space_reference": {"SpaceProduct", "SpaceReference"},
     "trusted.space.turning": {"turned_by"},
     "trusted.space.boxed_solution": {
-        *("Box", "BoxedSolution", "apart_in_boxes", "box_around", "is_inside", "proposed_rho", "solution_in_box")
+        *("Box", "BoxedSolution", "BoxProblem", "apart_in_boxes", "is_inside", "solution_in_box")
     },
     "trusted.space.product_forms": {"CONE", "SIGNED", "Ellipsoid", "Frame", "refines"},
+    "trusted.space.krawczyk": {"Contraction", "NaturalMap", "Step"},
     "trusted.space.solution_curve": None,
     "trusted.space.curve_chains": None,
     "trusted.space.curve_events": None,
     "trusted.space.curve_parts": None,
     "trusted.space.curve_runs": {"CurveParts", "KnownCurve", "Run"},
-    "trusted.space.piece_forms": {"PieceWeights", "how_far_off"},
-    "trusted.space.pieces": {"AlphaPiece", "lie_along"},
+    "trusted.space.pieces": {"AlphaPiece", "LeafArc", "lie_along"},
     "trusted.space.space_uniqueness": {
-        *("LARGEST_UNIT", "LooseSolution", "OnlySolution"),
-        *("equations", "lone_root", "only_root", "only_solution_in_space"),
+        *("LeafReference", "LooseSolution", "OnlySolution", "PieceWeights"),
+        *("equations", "how_far_off", "moderate_units"),
     },
     "proof.begun": None,
     "proof.proof_file": {"PROOF_VERSION", "Proof", "fraction_text", "packed", "coarse"},
@@ -167,7 +162,7 @@ def test_no_module_of_the_search_is_imported_however_indirectly():
 
 
 def test_the_guard_sees_the_search_where_it_is():
-    users = (["enumsol.branches.construction"], ["enumsol.gallery", "enumsol.cli.verify", "enumsol.roots.root_set"])
+    users = (["enumsol.branches.construction"], ["enumsol.gallery", "enumsol.cli.audit", "enumsol.roots.root_set"])
     assert all(any(map(is_search, closure_of(modules))) for modules in users)
     assert all(map(path_of, SEARCH))
 
@@ -253,9 +248,9 @@ def test_a_proof_in_space_loads_no_more_than_the_checker(tmp_path):
 
 
 def test_the_claims_point_at_the_one_place():
-    from enumsol.cli import verify
+    from enumsol.cli import audit
 
     readme = ROOT.parent / "README.md"
-    for text in (verify.verify.__doc__, *([readme.read_text()] if readme.is_file() else [])):
+    for text in (audit.verify.__doc__, *([readme.read_text()] if readme.is_file() else [])):
         assert "shares no code" not in text
         assert "enumsol.checker" in text

@@ -9,7 +9,7 @@ import pytest
 from complete import complete_report
 from effort import some
 from problems3d import OneNode, in_space, random_over_alpha, random_plane_over_alpha
-from proof_tools import copied, proof_of, records_of
+from proof_tools import copied, proof_of, put, records_of
 from space_graph_proofs import Parts, closed_branch, mutant
 from space_judge_mutants import checked, judged
 
@@ -61,6 +61,20 @@ def test_mutants_are_refused_or_say_what_is_true(name):
             assert counts, (k, how, reason)
             assert counts["curves"] == report.curves
     assert told[False] > told[True] > 0
+
+
+@pytest.mark.few(1, 1)
+@pytest.mark.parametrize("name", ["orthotropic", "friction", "fold", "load"])
+def test_one_step_of_both_tangents_is_changed(name):
+    """In the header, and in a point and a box of every curve."""
+    problem, _, records = proven(name)
+    starts = [k + 1 for k, record in enumerate(records) if isinstance(record, dict) and "curve" in record]
+    paths = [(0, "steps"), *((k + step, 5) for k in starts for step in (0, 1))]
+    for path in paths:
+        for place in range(problem.p, 3 * problem.p):
+            changed = proof_of(put(records, (*path, place), lambda step: 8.0 * step))
+            assert checked(problem, changed)[0] is None, (path, place)
+            assert judged(problem, changed)[0] is None, (path, place)
 
 
 @pytest.mark.few(0, 1)

@@ -13,6 +13,7 @@ import enumsol
 from enumsol import enumerate_roots, gallery, verify
 from enumsol.arithmetic.balls import Ball
 from enumsol.branches.space.space_graph import ByCurves
+from enumsol.search.space.curve_proposals import placed
 from enumsol.trusted.space.solution_curve import AlphaProblem, lies_in
 
 INTERVAL = Fraction(0), Fraction(1)
@@ -44,7 +45,7 @@ def test_a_proof_says_that_all_solutions_lie_on_its_curves(p, seed):
             crossed += int(np.sum(at[1:] * at[:-1] < 0))
         assert crossed == len(roots)
         for root in roots:
-            x = given.placed(np.concatenate([root.lambda_n, *root.lambda_t.T, [alpha]]))
+            x = placed(given, np.concatenate([root.lambda_n, *root.lambda_t.T, [alpha]]))
             assert any(lies_in(box, Ball(x, 1e-12 * np.abs(x) + 1e-13)) for box in boxes)
 
 

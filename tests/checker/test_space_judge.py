@@ -34,8 +34,8 @@ COARSE = (
     *("it is not proven to hold no root", "its ellipsoid does not exclude it"),
     *("its box is not proven to hold one solution", "its roots are not proven to lie in its box"),
     *("a place is not proven to be on its curve", "the box of a part of a curve is not proven to hold it"),
-    "the root that was declared is not proven to be the only one in it",
-    *("the root that is declared is not proven to be one whose form is definite", "no root was declared"),
+    *("the root that was declared is not proven to be the only one in it", "the root that was declared is not proven"),
+    "the root that is declared is not proven to be one whose form is definite",
 )
 BLOCKS = [((1, 1, 1), (2, 1, 1), (2, 1, 2), (3, 2, 2)), (0.3, 0.5, 1.0, 2.0, 3.0)]
 WEDGES = [((1, 1, 2), (2, 1, 2)), (0.3, 0.5, 1.0, 1.5, 2.0, 3.0)]

@@ -62,6 +62,18 @@ def test_changed_leaves_are_refused(seed):
             assert refused(problem, put_in_all(records, places, entry, value)), (entry, number)
 
 
+@pytest.mark.few(1, 1)
+@pytest.mark.parametrize("seed", SEEDS)
+def test_one_rho_of_both_components_is_changed(seed):
+    problem, records, places = proven(seed)
+    tau = SpaceSolvers(problem, 0.0, "verified").system.tau
+    pairs = tau[np.all(tau >= 0, axis=1)]
+    assert len(pairs)
+    for k in pairs.ravel():
+        for factor in (8.0, 1 + 2.0**-52):
+            assert refused(problem, put(records, (places[0], _RHO, int(k)), lambda rho, by=factor: by * rho))
+
+
 @pytest.mark.few(0, 1)
 @pytest.mark.parametrize("seed", SEEDS)
 def test_boxes_at_other_leaves(seed):

@@ -17,9 +17,9 @@ from refusals import bad_argument
 
 import enumsol
 from enumsol.cli import common
-from enumsol.support import pool
+from enumsol.support import workers as pool
 from enumsol.support.deadlines import heard_by, tell
-from enumsol.support.pool import RenewedPool
+from enumsol.support.workers import RenewedPool
 
 SCRIPT = """
 import time

@@ -143,9 +143,9 @@ def test_weights_between_nodes_are_the_shape_functions(nodes, weights):
     """A node a quarter from the right end of an edge; written from Lagrange's formula."""
     points = np.array([[0.75, 0.2], [0, 0], [1, 0], [0.5, 0]])
     facets, outward = np.array([[1, 2, 3][:nodes]]), np.tile([0.0, 1.0], (4, 1))
-    seen = faced(points, np.array([0]), np.array([[0.0, -1.0]]), facets, outward, facets[:0])
-    assert np.allclose(seen.weights.toarray()[0, [1, 2, 3][:nodes]], weights)
-    assert np.allclose(seen.gaps, 0.2)
+    _, found_weights, gaps = faced(points, np.array([0]), np.array([[0.0, -1.0]]), facets, outward, facets[:0])
+    assert np.allclose(found_weights.toarray()[0, [1, 2, 3][:nodes]], weights)
+    assert np.allclose(gaps, 0.2)
 
 
 @pytest.mark.parametrize(("heights", "gap"), [((0.5, 0.2), 0.2), ((0.2, 0.5), 0.2), ((-0.1, 0.3), -0.1)])
@@ -153,11 +153,11 @@ def test_of_several_facets_the_nearest_counts(heights, gap):
     """A node at height 0 above two shelves of one part, one behind the other."""
     points = np.array([[0.5, 0.0], *([x, -height] for height in heights for x in (0, 1))])
     facets, outward = np.array([[1, 2], [3, 4]]), np.tile([0.0, 1.0], (5, 1))
-    seen = faced(points, np.array([0]), np.array([[0.0, -1.0]]), facets, outward, facets[:0])
-    assert np.allclose(seen.gaps, gap)
+    _, _, gaps = faced(points, np.array([0]), np.array([[0.0, -1.0]]), facets, outward, facets[:0])
+    assert np.allclose(gaps, gap)
     outward[1 + 2 * int(np.argmin(np.abs(heights))) :][:2] *= -1  # the nearest one turns its back to the node
-    seen = faced(points, np.array([0]), np.array([[0.0, -1.0]]), facets, outward, facets[:0])
-    assert np.allclose(seen.gaps, max(heights))
+    _, _, gaps = faced(points, np.array([0]), np.array([[0.0, -1.0]]), facets, outward, facets[:0])
+    assert np.allclose(gaps, max(heights))
 
 
 @pytest.mark.parametrize("seed", range(20))
@@ -169,7 +169,7 @@ def test_points_that_are_faced_are_where_lines_cross_in_rationals(seed):
     normals = np.array([(a, -b) for a, b in rng.integers(1, 9, (6, 2)) * [rng.choice([-1, 1]), 1]]) / 1.0
     facets = np.stack([np.arange(6, 12), np.arange(7, 13)], axis=1)
     unit = normals / np.linalg.norm(normals, axis=1)[:, None]
-    seen = faced(points, np.arange(6), unit, facets, np.tile([0.0, 1.0], (13, 1)), facets[:0])
+    found, found_weights, gaps = faced(points, np.arange(6), unit, facets, np.tile([0.0, 1.0], (13, 1)), facets[:0])
     row = 0
     for k in range(6):
         x, n = ([Fraction(value) for value in vector] for vector in (points[k], normals[k]))
@@ -183,13 +183,13 @@ def test_points_that_are_faced_are_where_lines_cross_in_rationals(seed):
                 xi, s = (n[1] * d[0] - n[0] * d[1]) / det, (t[1] * d[0] - t[0] * d[1]) / det
                 if 0 <= xi <= 1:
                     crossings.append((abs(s), s, one, two, xi))
-        assert seen.found[k] == bool(crossings)
+        assert found[k] == bool(crossings)
         if crossings:
             _, s, one, two, xi = min(crossings)
-            assert np.isclose(seen.gaps[row], float(s) * np.linalg.norm(normals[k]))
+            assert np.isclose(gaps[row], float(s) * np.linalg.norm(normals[k]))
             expected = np.zeros(13)
             expected[[one, two]] = 1 - float(xi), float(xi)
-            assert np.allclose(seen.weights.toarray()[row], expected, atol=1e-8)
+            assert np.allclose(found_weights.toarray()[row], expected, atol=1e-8)
             row += 1
 
 

@@ -7,7 +7,7 @@ from refusals import refusal
 
 import enumsol
 from enumsol import Interrupted
-from enumsol.support import keeping
+from enumsol.support import deadlines
 
 #: Where the lines are that may be interrupted.
 ROOT = str(Path(enumsol.__file__).parent)
@@ -53,13 +53,12 @@ class AtLine:
         sys.settrace(self._before)
 
     def _call(self, frame, event, _):
-        name = frame.f_code.co_filename
-        if name == keeping.__file__:
-            if frame.f_code is not keeping.keeping.__code__:
-                return None
+        if frame.f_code is deadlines.keeping.__code__:
             self._depth += 1
             return self._outside
-        return self._inside if self._depth and name.startswith(ROOT) else None
+        if frame.f_code is deadlines._within.__code__:
+            return None
+        return self._inside if self._depth and frame.f_code.co_filename.startswith(ROOT) else None
 
     def _outside(self, frame, event, _):
         self._depth -= event == "return"

@@ -171,13 +171,17 @@ def block_on_springs(rng, spring):
 SLIDING = from_compliance(np.diag([1.0, 2.0, 4.0]), np.array([1.0, 3.0, 4.0]), 0.0, friction_slope=1.0)
 
 
-def sliding_node(alpha):
-    """lambda of ``SLIDING`` while it slips: (3 - 2 alpha d1, 4 - 4 alpha d2) is along d; the angle by bisection."""
+def sliding_node(alpha, ratio=1.0):
+    """lambda of ``SLIDING`` while it slips: (3 - 2 alpha d1, 4 - 4 alpha d2) is along d; the angle by bisection.
+
+    ``ratio``: with so many times the second component, which is no solution but a zero of the natural map whose rho
+    have this ratio.
+    """
     low, high = 0.0, 0.5 * np.pi
     for _ in range(200):
         phi = 0.5 * (low + high)
         d = np.cos(phi), np.sin(phi)
-        turned = (3 - 2 * alpha * d[0]) * d[1] - (4 - 4 * alpha * d[1]) * d[0]
+        turned = (3 - 2 * alpha * d[0]) * d[1] - ratio * (4 - 4 * alpha * d[1]) * d[0]
         low, high = (low, phi) if turned > 0 else (phi, high)
     return np.array([1.0, alpha * np.cos(low), alpha * np.sin(low)])
 

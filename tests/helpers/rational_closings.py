@@ -46,7 +46,7 @@ class Closings:
 
     def exact_leaf(self, codes, selection, given, numbers, count):
         """The selection as a polytope to be counted, if the leaf holds its solution."""
-        need(given == [i for i, code in enumerate(codes) if code in (5, 6)], "other nodes are free")
+        need(list(map(integer, given)) == [i for i, code in enumerate(codes) if code in (5, 6)], "other nodes are free")
         free, sliding = ([i for i, code in enumerate(codes) if code in some] for some in ((5, 6), (7, 8)))
         refined = [selection[i] if selection[i] in SIDES.get(code, ()) else code for i, code in enumerate(codes)]
         self.check(selection, free, refined)

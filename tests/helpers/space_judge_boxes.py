@@ -10,6 +10,7 @@ from copy import copy
 from functools import cached_property
 
 from flint import arb, arb_mat
+from rational_forms import need
 from space_judge_data import Undecided, column, length_of
 from space_judge_leaves import Singular, solve
 
@@ -62,6 +63,7 @@ class NaturalMap:
     def __init__(self, S, g0, g1, nodes, discs, steps, alpha=None):
         self.S, self.g0, self.g1, self.nodes, self.discs, self.steps = S, g0, g1, nodes, discs, steps
         self.m, self.alpha, self.size = len(g0), alpha, len(g0) + (alpha is None)
+        self.check_steps(steps)
         m, table = self.m, S.tolist()
         scaled = arb_mat([[steps[i] * table[i][j] + int(i == j) for j in range(m)] for i in range(m)])
         self.T = scaled.inv()
@@ -70,8 +72,15 @@ class NaturalMap:
         self.k = [arb(1)] * m
         self.G = []
 
+    def check_steps(self, steps):
+        """Zeros of a map with two numbers for the components of one tau are no solutions."""
+        need(all(step > 0 for step in steps), "a step is not positive")
+        for _, places in self.nodes:
+            need(all(steps[t] == steps[places[0]] for t in places), "both components of a tau need the same step")
+
     def with_steps(self, k):
         """The same with k times the steps in z."""
+        self.check_steps(k)
         found = copy(self)
         found.__dict__.pop("Z", None)
         found.k = k

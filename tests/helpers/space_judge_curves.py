@@ -307,7 +307,8 @@ def place_of(problem, record):
 
     c, d, e, radius = (numbers(part, size) for part in record[1:5])
     rho = numbers(record[5], size - 1)
-    need(min(rho) > 0 and min(radius) >= 0, "a radius or a step has the wrong sign")
+    problem.natural.check_steps(rho)
+    need(min(radius) >= 0, "a radius is negative")
     (half,) = numbers([record[6]], 1)
     need(half >= 0, "half is negative")
     return Place(problem.natural, c, d, e, radius, half, rho)

@@ -35,7 +35,8 @@ class RootForm:
         for row, factor in zip(rows, balance, strict=True):
             size = sum((x * x for x in row), arb(0))
             Q += square(row) * (heavy / size if size > 0 else heavy).max(factor)
-        self.least = (1 / (2 * Q.inv().trace())).lower()
+        # a share of the smallest eigenvalue, for what displacements cost: small, since the rest has to prove all else
+        self.least = (1 / (64 * Q.inv().trace())).lower()
         self.inverse = _raised(Q, -self.least).inv()
         off = [[share - x if i == j else -x for j, x in enumerate(row)] for i, row in enumerate(D.tolist())]
         self.C = self.G * arb_mat(off)

@@ -9,7 +9,7 @@ from enumsol.branches.enclosed.following import TracedProblem, follow_selections
 from enumsol.branches.enclosed.joining import EventPlaceKind
 from enumsol.branches.gluing import glue
 from enumsol.branches.known_selections import KnownSelections
-from enumsol.branches.ways import ByAlgebra
+from enumsol.branches.ways import by_algebra
 from enumsol.condensation.exact import ExactCondensed
 
 
@@ -39,7 +39,7 @@ def two_graphs(problem, interval):
     a, b = (Fraction(end) for end in interval)
     exact = ExactCondensed.from_problem(problem)
     traced = TracedProblem(problem, (a, b), exact.zero)
-    way = ByAlgebra.of(problem, (a, b), exact, "verified")
+    way = by_algebra(problem, (a, b), exact, "verified")
     search = way.begin()
     search.run()
     followed = follow_selections(traced, search.pieces, cut_short=search.stopped is not None)

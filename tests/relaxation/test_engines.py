@@ -60,9 +60,10 @@ def test_the_energy_is_the_form_that_is_minimised_by_default():
     problem, alpha = named("wedge-8-5")
     system = problem.condensed.at(alpha).scaled
     want = searched(problem, alpha)
-    assert searched(problem, alpha, form=(system.S, system.g)).nodes == want.nodes
+    still = np.zeros_like(system.g)
+    assert searched(problem, alpha, form=active_set.PieceForm(system.S, system.g, still)).nodes == want.nodes
     # any multiple of the energy bounds it as well; a small one prunes no sooner
-    slack = searched(problem, alpha, form=(1e-9 * system.S, 1e-9 * system.g))
+    slack = searched(problem, alpha, form=active_set.PieceForm(1e-9 * system.S, 1e-9 * system.g, still))
     assert slack.nodes > want.nodes
     assert sorted(s.codes for s in slack.solutions) == sorted(s.codes for s in want.solutions)
 

@@ -13,7 +13,7 @@ from enumsol.relaxation.convex_forms import SlipFormAscent
 from enumsol.relaxation.engine import PRUNE_MARGIN
 from enumsol.relaxation.space_relaxation import SpaceEngine
 from enumsol.search.space.space_setup import SpaceSolvers
-from enumsol.trusted.space.sector_rows import sector_margin
+from enumsol.trusted.space.sector_margins import space_margin
 
 
 def all_rows(engine, codes):
@@ -76,7 +76,7 @@ def test_branching_takes_a_node_of_which_all_children_but_one_are_excluded_or_th
                 if child.pruned:
                     numbers, values = child.multipliers()
                     rows = [engine.rows[number] for number in numbers.tolist()]
-                    assert sector_margin(balls, with_code(codes, node, code), rows, values) > 0
+                    assert space_margin(balls, with_code(codes, node, code), rows, values) > 0
                     assert len(child.forces) == len(child.displacements) == len(g)
                     given += 1
             stack.extend(left[node])
@@ -147,8 +147,7 @@ def test_derivatives_are_those_of_what_is_maximised(seed):
 
     def derivatives(numbers):
         found = ascent._candidate(numbers)
-        normals, forces = ascent._normals(found.relaxation), found.relaxation.forces
-        one, two = ascent._products.derivatives(found.form.H, found.factor, forces, scale, normals, np.eye(size))
+        one, two = ascent._of_products(found, scale, ascent._normals(found.relaxation))
         return shares @ one, shares @ two @ shares.T
 
     gradient, hessian = derivatives(numbers)

@@ -14,7 +14,7 @@ from roots.test_space_weak_springs import body
 
 import enumsol
 from enumsol import enumerate_roots, gallery
-from enumsol.cli import root_report
+from enumsol.cli import roots as command
 from enumsol.model.sectors import SECTORS
 from enumsol.roots.space_roots import _hull, regions_of
 from enumsol.search.space.open_leaves import Cause
@@ -166,14 +166,14 @@ def test_a_region_on_the_command_line_and_in_tables():
     problem = from_compliance(*beside([STUCK_AT_ITS_LIMIT]), 1.0)
     roots = enumerate_roots(problem, 0)
     text = "undecided region 0: contact (2 leaves of the tree); a root in it has max lambda_n from 5 to 5"
-    assert text in root_report.roots_as_text(roots)
-    (entry,) = json.loads(root_report.roots_as_json(roots, "here"))["undecided"]
+    assert text in command.roots_as_text(roots)
+    (entry,) = json.loads(command.roots_as_json(roots, "here"))["undecided"]
     assert (entry["statuses"], entry["leaves"]) == (["contact"], 2)
     np.testing.assert_allclose(entry["bounds"]["lambda_t"], [[[4, 4], [3, 3]]], atol=1e-10)
     np.testing.assert_allclose(entry["slip_angle"], np.arctan2(3, 4), atol=1e-6)
     assert enumsol.multiplicity_table(problem, [0])["undecided"].tolist() == [1]
     plane = enumerate_roots(gallery.two_node_square(), 3.5, max_nodes=2)
-    assert set(json.loads(root_report.roots_as_json(plane, "here"))["undecided"][0]) == {"statuses", "reason", "hint"}
+    assert set(json.loads(command.roots_as_json(plane, "here"))["undecided"][0]) == {"statuses", "reason", "hint"}
 
 
 @pytest.mark.parametrize("seed", range(4))

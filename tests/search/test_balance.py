@@ -9,7 +9,8 @@ from floating_oracle import block_on_table
 
 import enumsol
 from enumsol.model.statuses import UNDECIDED
-from enumsol.search.floating_solvers import FloatingSolvers, in_balance
+from enumsol.search.certifiers.exclusions import in_balance
+from enumsol.search.solvers import Solvers
 from enumsol.trusted.status_rows import FORBIDDEN, NONNEGATIVE, row_signs
 
 sys.path.insert(0, str(Path(__file__).parents[2] / "studies"))
@@ -17,7 +18,7 @@ from contact_alone.bodies import pin, telescope
 
 
 def test_multipliers_are_brought_into_balance_with_signs_that_are_allowed():
-    system = FloatingSolvers(block_on_table(4, push=0.5), Fraction(0), "verified", 1e-9).exclusions.system
+    system = Solvers(block_on_table(4, push=0.5), Fraction(0), "verified", 1e-9).exclusions.system
     codes, p = (1, 1, UNDECIDED, 2, UNDECIDED), 5
     given = np.array([4 * p, 4 * p + 2, 5 * p + 1, 4 * p + 4])
     rows, values = in_balance(system, codes, given, np.array([1.0, 1.0, 1.0, 1.0]))

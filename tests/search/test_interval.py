@@ -17,7 +17,7 @@ from enumsol.branches.known_selections import KnownSelections
 from enumsol.condensation.exact import ExactCondensed
 from enumsol.errors import IncompleteGraphError, TooLargeError
 from enumsol.model.statuses import CONTACT, OPEN, SLIP_MINUS, SLIP_PLUS, STICK, UNDECIDED
-from enumsol.relaxation.interval_relaxation import IntervalEngine, IntervalSystem
+from enumsol.relaxation.active_set import ActiveSetEngine, IntervalSystem
 from enumsol.search import subintervals as interval_search
 from enumsol.search.certifiers.interval_certifiers import ExactIntervalCertifier, VerifiedIntervalCertifier
 from enumsol.search.interval_tree import EmptyLeaf
@@ -101,7 +101,7 @@ def test_the_relaxation_on_a_loading_path_bounds_the_energy_from_below(rng):
     for _ in range(10):
         problem = generic_problem(rng, 2, "load")
         system = IntervalSystem.from_problem(problem.condensed, 1.0, 2.0, None)
-        relaxation = IntervalEngine(system).root([], [])
+        relaxation = ActiveSetEngine.over(system).root([], [])
         loads = [system.g + tau * system.half for tau in np.linspace(-1, 1, 21)]
         least = min(-0.25 * g @ np.linalg.solve(system.S, g) for g in loads)
         assert relaxation.bound <= least + 1e-12

@@ -14,7 +14,7 @@ from proof_tools import of_kind, proof_of, records_of, replaced
 from rational_checker import check_records
 
 from enumsol import branch_graph, gallery, verify
-from enumsol.relaxation.interval_relaxation import IntervalEngine, IntervalSystem, PieceForm
+from enumsol.relaxation.active_set import ActiveSetEngine, IntervalSystem, PieceForm
 from enumsol.search import interval_tree
 from enumsol.search.form_policy import PairedTerms, better_form
 from enumsol.trusted.exclusion import exclusion_margin
@@ -107,7 +107,7 @@ def test_the_relaxation_with_a_form_bounds_it_from_below():
         problem = generic_problem(rng, 2, "load")
         system = IntervalSystem.from_problem(problem.condensed, 1.0, 2.0, None)
         form = PieceForm.of(system, np.array([[1.2, 0.9], [0.1, -0.1], [0.4, 0.5], [0.5, 0.6]]))
-        relaxation = IntervalEngine(system, form).root([], [])
+        relaxation = ActiveSetEngine.over(system, form).root([], [])
         loads = [form.h + tau * form.half for tau in np.linspace(-1, 1, 21)]
         least = min(-0.25 * h @ np.linalg.solve(form.H, h) for h in loads)
         assert relaxation.bound <= least + 1e-12

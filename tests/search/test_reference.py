@@ -11,11 +11,11 @@ from proof_tools import kinds_of
 
 import enumsol
 from enumsol.arithmetic.balls import Ball
-from enumsol.search.floating_solvers import FloatingSolvers
 from enumsol.search.reference_closer import proposed, rows_of
+from enumsol.search.solvers import Solvers
 from enumsol.trusted.reference import Reference
-from enumsol.trusted.root_forms import Body, Multipliers, RootForm
 from enumsol.trusted.status_rows import FORBIDDEN, refines, row_signs
+from enumsol.trusted.uniqueness_forms import RootForm
 
 #: Bodies with several solutions, some of which have a definite form, and some with one.
 SEVERAL = (69, 635, 832, 897, 1053, 1164, 1321, 1799, 1903, 2550, 2777, 3086)
@@ -26,7 +26,7 @@ ONE = (8, 40, 49, 54)
 def of(seed):
     """A body's certificates, and the selections that hold solutions."""
     problem = random_body(seed)
-    exclusions = FloatingSolvers(problem, 0, "verified", 1e-9).exclusions
+    exclusions = Solvers(problem, 0, "verified", 1e-9).exclusions
     rubs = exclusions.system.F > 0
     return exclusions, {
         tuple(code if code == 0 or some else 4 for code, some in zip(codes, rubs, strict=True))
@@ -112,8 +112,8 @@ def test_the_small_matrix_is_the_minimum(seed):
     X, G, C = rng.normal(size=(m, m + 2)), rng.normal(size=(r, m)), rng.normal(size=(r, m))
     S = X @ X.T
     D = np.eye(m) + 0.05 * rng.normal(size=(m, m))
-    given = Multipliers(Ball.exact(D.T @ S), Ball.exact(C), np.zeros(m), np.zeros(m))
-    form = RootForm.of(Body(Ball.exact(S), Ball.exact(G)), given, 3.0)
+    body = Ball.exact(S), Ball.exact(G)
+    form = RootForm.factored(body, Ball.exact(D.T @ S), Ball.exact(C), np.zeros(m), np.zeros(m), 3.0)
     equations, tight = rng.normal(size=(1, m)), rng.normal(size=(2, m))
     M = form.small_matrix(Ball.exact(equations), Ball.exact(tight), [(0, 1, 0.7), (1, 1, 0.2)])
     least = 2 * form.least
@@ -173,7 +173,7 @@ def test_points_on_a_floor_have_one_root(pushes, held):
 
 def test_a_mode_that_nothing_holds_is_not_forgotten():
     """Of points that only press, the form has no mode, nor do gaps cost where they slide: one of them has to stick."""
-    system = FloatingSolvers(bar_on_floor((0.0, 0.0)), 0, "verified", 1e-9).exclusions.system
+    system = Solvers(bar_on_floor((0.0, 0.0)), 0, "verified", 1e-9).exclusions.system
     reference = Reference.of(system, (1, 1), np.array([1.0] * 4 + [0.0] * 4), 16.0, 1.0)
     assert np.all(reference.form.idle)
     for codes, rows in (((6, 6), []), ((5, 5), [8, 9]), ((6, 5), [9]), ((6, 1), [9])):
@@ -185,20 +185,17 @@ def test_a_mode_that_nothing_holds_is_not_forgotten():
 # -- at the edge of float64 --------------------------------------------------------------------------------------------
 
 
-def tiny_form(lost):
+def tiny_form(lost, mode=1.0):
     """A form in one component of lambda and one mode, with what theta may be off."""
-    body = Body(Ball.exact(np.eye(1)), Ball.exact(np.ones((1, 1))))
-    given = Multipliers(Ball.exact(np.eye(1)), Ball.exact(np.zeros((1, 1))), np.array([lost]), np.zeros(1))
-    return RootForm.of(body, given, 1.0)
+    one, none = Ball.exact(np.eye(1)), Ball.exact(np.zeros((1, 1)))
+    return RootForm.factored((one, Ball.exact(np.full((1, 1), mode))), one, none, np.array([lost]), np.zeros(1), 1.0)
 
 
 def test_what_theta_may_be_off_is_not_lost_where_it_is_tiny():
     assert tiny_form(0.0).tilt == 0
     for lost in (1e-3, 1e-100, 1e-200, 5e-324):
         assert tiny_form(lost).tilt > 0
-    body = Body(Ball.exact(np.eye(1)), Ball.exact(np.full((1, 1), 1e-150)))
-    given = Multipliers(Ball.exact(np.eye(1)), Ball.exact(np.zeros((1, 1))), np.array([1e-200]), np.zeros(1))
-    assert RootForm.of(body, given, 1.0).tilt > 0
+    assert tiny_form(1e-200, 1e-150).tilt > 0
 
 
 def test_rows_that_overflow_prove_nothing():

@@ -41,6 +41,7 @@ from trees import above_known_roots, by_the_tree
 import enumsol
 from enumsol import ContactProblem, Interrupted, InvalidArgumentError, Proof, enumerate_roots, gallery, verify
 from enumsol.condensation.data import EXACT_DOF_LIMIT
+from enumsol.condensation.enclosure import NotEnclosedError
 from enumsol.proof.begun import BegunProof
 from enumsol.proof.leaves import leaves_of
 from enumsol.proof.records import Tree
@@ -145,7 +146,10 @@ def test_the_problems_have_all_kinds_of_records():
 
 
 def test_exclusions_in_rationals(tmp_path, monkeypatch):
-    monkeypatch.setattr("enumsol.search.solvers._positive", lambda _: False)
+    def nothing(problem):
+        raise NotEnclosedError(f"no balls for {problem.p} nodes")
+
+    monkeypatch.setattr("enumsol.search.solvers.enclosure_of", nothing)
     problem, alpha = PROBLEMS["border"]()
     whole = enumerate_roots(problem, alpha)
     records, data = records_of(whole.proof), bytes_of(whole.proof)

@@ -27,7 +27,7 @@ from enumsol import enumerate_roots, fem, verify
 from enumsol.arithmetic.balls import SAFE
 from enumsol.checker.space_checker import SpaceChecker
 from enumsol.search.space.space_setup import SpaceSolvers
-from enumsol.trusted.space.slip_forms import SlipForm
+from enumsol.trusted.space.sector_margins import SlipForm
 
 
 def on_springs(seed, p=3, spring=1e-3):

@@ -20,8 +20,7 @@ import enumsol
 from enumsol import Proof, enumerate_roots, gallery, multiplicity_table, verify, write_problem
 from enumsol.search import parallel
 from enumsol.support import workers
-from enumsol.support.pool import RenewedPool
-from enumsol.support.workers import Crew
+from enumsol.support.workers import Crew, RenewedPool
 
 #: What takes a process down.
 DEATHS = {"os._exit": (os._exit, 1), "SIGKILL": (signal.raise_signal, signal.SIGKILL)}

@@ -9,7 +9,7 @@ from problems3d import SLIDING
 
 import enumsol
 from enumsol import Interrupted, OutOfMemoryError, gallery
-from enumsol.support import keeping
+from enumsol.support import deadlines
 from enumsol.support.deadlines import current
 
 TRIANGLE, SQUARE = gallery.one_node_triangle(), gallery.two_node_square()
@@ -133,7 +133,7 @@ def test_a_second_ctrl_c_loses_nothing():
         raise KeyboardInterrupt
 
     with pytest.raises(Interrupted, match=r"^call was interrupted; so far$") as caught:
-        keeping.keeping("call", work, rest, lambda _: "; so far")
+        deadlines.keeping("call", work, rest, lambda _: "; so far")
     assert caught.value.partial == "what was found"
 
 
@@ -142,5 +142,5 @@ def test_without_memory_to_keep_anything_there_is_one_sentence():
         raise MemoryError
 
     with pytest.raises(OutOfMemoryError, match=r"^call ran out of memory, and nothing could be kept$") as caught:
-        keeping.keeping("call", full, full, str)
+        deadlines.keeping("call", full, full, str)
     assert caught.value.partial is None

@@ -6,20 +6,28 @@ import numpy as np
 import oracles3d
 import pytest
 from effort import some
-from problems3d import degenerate_integers, exactly, forces, from_compliance, random_coupled, scaled
+from problems3d import (
+    SLIDING,
+    degenerate_integers,
+    exactly,
+    forces,
+    from_compliance,
+    random_coupled,
+    scaled,
+    sliding_node,
+)
 from space_proofs import RANDOM, random_problem
 
 from enumsol import enumerate_roots
 from enumsol.arithmetic.balls import Ball
+from enumsol.search.space.product_search import box_around, proposed_rho
 from enumsol.search.space.space_setup import SpaceSolvers
 from enumsol.trusted.space.boxed_solution import (
     Box,
     BoxedSolution,
-    _NaturalMap,
+    BoxProblem,
     apart_in_boxes,
-    box_around,
     is_inside,
-    proposed_rho,
     solution_in_box,
 )
 
@@ -63,7 +71,7 @@ def natural(problem, y):
     S, g, rho = problem.S.mid, problem.g.mid, problem.rho
     z = y + rho * (g - S @ y)
     out = z.copy()
-    for i, places in enumerate(problem.discs.tau):
+    for i, places in enumerate(problem.system.tau):
         t = places[places >= 0]
         out[i] = max(z[i], 0.0)
         length = np.linalg.norm(z[t])
@@ -78,17 +86,19 @@ def test_steps_stay_within_their_bounds():
     rng, tried = np.random.default_rng(0), 0
     for seed in range(some(12, of=60)):
         solvers, y, _, _, _ = boxed(seed)
-        problem = _NaturalMap.of(solvers.enclosed, proposed_rho(solvers.enclosed)[seed % 2])
+        problem = BoxProblem.of(solvers.enclosed, proposed_rho(solvers.enclosed)[seed % 2])
         assert problem.T.mid @ (np.eye(len(y)) + problem.rho[:, None] * problem.S.mid) == pytest.approx(np.eye(len(y)))
         centre = y * problem.system.unit + rng.normal(size=len(y)) * rng.choice([0.0, 1e-3, 0.1])
         reach = np.full(len(y), 10.0 ** rng.uniform(-4, 0))
-        step = problem._step(centre, reach)
+        near = problem.around(centre)
+        step = near.step(near.extent(reach))
         if step is None:
             continue
         tried += 1
         for _ in range(40):
             zeta = reach * rng.uniform(-1, 1, len(y)) * rng.choice([1.0, 0.3])
             moved = zeta - step.Y @ natural(problem, centre + problem.T.mid @ zeta) - step.move.mid
+            moved -= step.G.mid @ step.first
             bound = step.E @ np.abs(zeta) + 0.5 * np.abs(step.G.mid) @ np.abs(step.V.mid @ zeta)
             assert np.all(np.abs(moved) <= bound * (1 + 1e-9) + 1e-10 * (1 + np.abs(step.Y).max()))
     assert tried > some(7, of=40)
@@ -187,6 +197,33 @@ def test_boxes_that_are_none():
         with np.errstate(all="ignore"):
             assert solution_in_box(system, Box.of(system, *numbers)) is None
     assert box_around(system, np.full(len(c), np.nan)) is None
+
+
+@pytest.mark.parametrize(("alpha", "size"), [(0.5, 1.5), (1.0, 0.1875)])
+def test_both_components_of_tau_have_one_rho(alpha, size):
+    """With two the natural map has another zero, which is no solution (theory, (12.10))."""
+    solvers = SpaceSolvers(SLIDING, alpha, "verified")
+    (rho, _), radius = proposed_rho(solvers.enclosed), np.full(3, size)
+    y, zero = (scaled(solvers.system, sliding_node(alpha, ratio)) for ratio in (1.0, 8.0))
+    one = solution_in_box(solvers.enclosed, Box.of(solvers.enclosed, y, radius, rho))
+    assert np.all(np.abs(one.y.mid - y) <= one.y.rad + 1e-12)
+    assert np.max(np.abs(zero - y)) > 0.1
+    for centre in (y, zero):
+        for factors in ([1, 1, 8], [1, 0.125, 1], [1, 1, 1 + 2.0**-52]):
+            assert solution_in_box(solvers.enclosed, Box.of(solvers.enclosed, centre, radius, rho * factors)) is None
+
+
+def test_components_in_other_units_have_one_rho_in_the_problems_own():
+    """A small coefficient along one axis, so that the units of both components differ."""
+    problem = from_compliance(np.diag([1.0, 2.0, 4.0]), np.array([1.0, 3.0, 4.0]), ([0.5], [2.0**-12]))
+    solvers = SpaceSolvers(problem, 0.0, "verified")
+    assert len(set(solvers.system.unit)) == 2
+    box = box_around(solvers.enclosed, scaled(solvers.system, forces(enumerate_roots(problem, 0)[0])))
+    rho = box.rho * solvers.system.unit**2
+    assert (rho[1] == rho[2], box.rho[1] == box.rho[2]) == (True, False)
+    assert solution_in_box(solvers.enclosed, box) is not None
+    same = Box.of(solvers.enclosed, box.centre, box.radius, box.rho[[0, 1, 1]])
+    assert solution_in_box(solvers.enclosed, same) is None
 
 
 def test_which_solutions_are_the_same():

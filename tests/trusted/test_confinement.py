@@ -11,8 +11,7 @@ from helpers.floating_oracle import Oracle, block_on_table, random_body
 
 import enumsol
 from enumsol.condensation.enclosure import enclosure_of
-from enumsol.trusted.confinement import is_confined, motion_against, without_bound
-from enumsol.trusted.floating_bounds import is_unbalanced
+from enumsol.trusted.floating_bounds import is_confined, is_unbalanced, motion_against, without_bound
 
 
 def enclosed(problem):

@@ -12,8 +12,9 @@ from enumsol import enumerate_roots
 from enumsol.arithmetic.balls import Ball
 from enumsol.branches.space import chains
 from enumsol.branches.space.chains import chain_through
+from enumsol.search.space.curve_proposals import curve_around, curve_point
 from enumsol.trusted.space.curve_chains import CurveChain, apart, link_between
-from enumsol.trusted.space.solution_curve import AlphaProblem, curve_around, curve_point, lies_in
+from enumsol.trusted.space.solution_curve import AlphaProblem, lies_in
 
 
 def test_one_curve_followed_twice_is_not_two(monkeypatch):

@@ -16,11 +16,11 @@ from enumsol.branches.space.space_graph import ByCurves
 from enumsol.condensation.space_condensed import AlphaSpace
 from enumsol.search.space.piece_certificates import ExaminedPiece, runs_over
 from enumsol.trusted.space import curve_runs
-from enumsol.trusted.space.curve_runs import KnownCurve, Run
-from enumsol.trusted.space.piece_forms import PieceWeights, how_far_off
+from enumsol.trusted.space.curve_runs import CurveParts, KnownCurve, Run
 from enumsol.trusted.space.pieces import AlphaPiece
 from enumsol.trusted.space.sector_rows import CONTACT, OPEN, STICK, UNDECIDED
 from enumsol.trusted.space.solution_curve import AlphaProblem, CurveBox, SolutionCurve
+from enumsol.trusted.space.space_uniqueness import PieceWeights, how_far_off
 
 INTERVAL = Fraction(0), Fraction(1)
 #: Nodes and seeds: at some of the many a fold, two curves, or changes of status.
@@ -188,6 +188,23 @@ def test_psi_is_off_by_no_less_than_at_any_sample(p, seed):
     assert tested or (p, seed) != (1, 1)
 
 
+@pytest.mark.parametrize("rho", [np.inf, 1e300, 1e-300, 0.0])
+def test_slips_are_not_known_where_steps_over_or_underflow(rho):
+    """Of a node that is open with w = z: no theta serves it by its gap then."""
+    none = np.zeros(1)
+    alpha, F = Ball.exact(none), Ball.exact(np.ones((1, 1)))
+    z, rubs = Ball.exact(np.array([[-1.0, 1.5, 0.0]])), np.ones((1, 2), dtype=bool)
+
+    def slip(steps):
+        with np.errstate(all="ignore"):
+            parts = CurveParts(alpha, F, z, np.array([steps]), rubs, none.astype(int), Ball.exact(none))
+            return parts.slips[1][0, 0]
+
+    assert slip([1.0, 1.0, 1.0])[0].size >= 1.5
+    far = slip([1.0, rho, rho])[0]
+    assert not np.isfinite(far.rad)
+
+
 def test_a_curve_holds_a_ball_if_all_its_corners_are_held():
     """A point is held if x - c - t d - G s is within the radius for some s: by linear programming."""
     rng, said = np.random.default_rng(2), {True: 0, False: 0}
@@ -197,10 +214,11 @@ def test_a_curve_holds_a_ball_if_all_its_corners_are_held():
         d, G = d / (e @ d), rng.standard_normal((size, count))
         radius, shares = 0.2 + rng.exponential(size=size), 2 * rng.exponential(size=count)
         half = 2 * float(rng.exponential())
-        near = SimpleNamespace(unit=np.ones(size), c=c, d=d, e=e)
+        near = SimpleNamespace(d=d, border=e[None])
         step = SimpleNamespace(G=Ball.exact(G))
         found = SimpleNamespace(near=near, step=step, radius=radius, shares=shares)
-        curve = SolutionCurve(CurveBox(c, d, e, half, radius, np.ones(size - 1)), 1, found)
+        box, problem = CurveBox(c, d, e, half, radius, np.ones(size - 1)), SimpleNamespace(unit=np.ones(size))
+        curve = SolutionCurve(box, 1, problem, found)
         middle = c + rng.uniform(-half, half) * d + G @ (rng.uniform(-0.9, 0.9, count) * shares)
         x = Ball(middle, 0.05 * rng.exponential(size=size))
         held = curve.holds(x)

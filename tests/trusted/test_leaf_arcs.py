@@ -10,6 +10,7 @@ import enumsol
 from enumsol.branches.space.chains import chain_through
 from enumsol.condensation.space_condensed import AlphaSpace
 from enumsol.model.sectors import DEEPEST, SECTORS, places
+from enumsol.search.space.curve_proposals import placed
 from enumsol.search.space.space_setup import SpaceSolvers
 from enumsol.trusted.space.leaves import SpaceRoot
 from enumsol.trusted.space.pieces import AlphaPiece
@@ -94,7 +95,7 @@ def test_a_piece_is_narrowed_to_all_alpha_of_a_leafs_roots(p, seed):
 
 def is_on(chain, given, root):
     """Whether a root lies in a box of a curve, or as near to it as solutions of the box are."""
-    x = given.placed(np.concatenate([root.lambda_n, *root.lambda_t.T, [float(root.alpha)]]))
+    x = placed(given, np.concatenate([root.lambda_n, *root.lambda_t.T, [float(root.alpha)]]))
     for curve in (link.curve for link in chain.links):
         t = float(curve.box.border @ (x - curve.box.centre))
         beside = np.abs(x - curve.box.centre - t * curve.box.direction)

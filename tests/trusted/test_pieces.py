@@ -12,12 +12,14 @@ from enumsol.arithmetic.balls import Ball
 from enumsol.branches.space.chains import chain_through
 from enumsol.condensation.space_condensed import AlphaSpace, EnclosedSpace, PieceSpace, PieceTurn
 from enumsol.model.sectors import SECTORS, nearest, start_of
+from enumsol.search.space.curve_proposals import placed
 from enumsol.search.space.piece_multipliers import PieceBounds
 from enumsol.search.space.space_setup import SpaceSolvers
 from enumsol.trusted.space.leaf_equations import Leaf, slopes_by_second
 from enumsol.trusted.space.leaves import Open, SpaceRoot
 from enumsol.trusted.space.pieces import AlphaPiece, lie_along
-from enumsol.trusted.space.sector_rows import CONTACT, OPEN, STICK, UNDECIDED, row_sign, sector_margin, sector_row_terms
+from enumsol.trusted.space.sector_margins import space_margin
+from enumsol.trusted.space.sector_rows import CONTACT, OPEN, STICK, UNDECIDED, row_sign, sector_row_terms
 from enumsol.trusted.space.solution_curve import AlphaProblem
 
 LOW, HIGH = Fraction(1, 4), Fraction(1, 2)
@@ -104,7 +106,7 @@ def test_the_same_multipliers_at_both_ends_prove_the_least_minimum_over_a_piece(
         size = 1.0 + abs(min(ends))
         assert min(inside) >= min(ends) - 1e-9 * size
         for end, bound in zip(piece.ends, ends, strict=True):
-            assert bound - 1e-6 * size <= sector_margin(end, codes, rows, values) <= bound + 1e-9 * size
+            assert bound - 1e-6 * size <= space_margin(end, codes, rows, values) <= bound + 1e-9 * size
         assert (piece.margin(codes, rows, (values, values)) > 0) == (min(ends) > 0)
 
 
@@ -306,7 +308,7 @@ def test_no_root_over_a_piece_is_missed(p, seed):
                     moved = problem.condensed.free_displacements(float(alpha)) - problem.condensed.S @ near
                     assert np.all(np.abs(w.mid - moved) <= w.rad + 1e-9 * np.max(np.abs(moved)) + 1e-13)
                 for low, high in (ends for ends in piece.places(found, given) if len(ends) == 2):
-                    assert lies_between(low, high, given.placed(np.append(near, float(alpha))))
+                    assert lies_between(low, high, placed(given, np.append(near, float(alpha))))
                     drifts += 1
                 settled += isinstance(found, SpaceRoot)
     assert settled

@@ -10,12 +10,20 @@ from problems3d import SLIDING, forces, from_compliance, random_compliance, slid
 import enumsol
 from enumsol.arithmetic.balls import Ball
 from enumsol.branches.space.pieces import status_margin
+from enumsol.condensation.enclosure import NotEnclosedError
+from enumsol.search.space.curve_proposals import (
+    border_of_forces,
+    border_of_zeta,
+    curve_around,
+    curve_point,
+    placed,
+    unplaced,
+)
 from enumsol.trusted.space.sector_rows import OPEN, STICK
 from enumsol.trusted.space.solution_curve import (
     SLIP,
     AlphaProblem,
-    curve_around,
-    curve_point,
+    CurveBox,
     lies_in,
     only_curve,
     parameter_in,
@@ -25,7 +33,7 @@ GIVEN = AlphaProblem.of(SLIDING.enclosure)
 
 
 def box_of(given, x, half):
-    x = given.placed(x)
+    x = placed(given, x)
     point = curve_point(given, x, np.eye(len(x))[-1])
     border = point.direction / (point.direction @ point.direction)
     curve = curve_around(given, point.x, point.direction, border, half, roomy=True)
@@ -34,7 +42,7 @@ def box_of(given, x, half):
 
 def sliding(alpha):
     """The point of the curve of the sliding node."""
-    return GIVEN.placed(np.append(sliding_node(alpha), alpha))
+    return placed(GIVEN, np.append(sliding_node(alpha), alpha))
 
 
 @pytest.fixture(scope="module")
@@ -54,14 +62,14 @@ def test_coordinates_are_those_of_forces_and_displacements(seed):
     w = problem.condensed.free_displacements(alpha) - problem.condensed.S @ y
     expected = y / q - given.rho * (q * w / given.length) * given.force
     x = np.append(y, alpha)
-    assert given.placed(x) == pytest.approx(np.append(expected, alpha), rel=1e-12)
-    assert given.unplaced(given.placed(x)) == pytest.approx(x, rel=1e-11)
+    assert placed(given, x) == pytest.approx(np.append(expected, alpha), rel=1e-12)
+    assert unplaced(given, placed(given, x)) == pytest.approx(x, rel=1e-11)
     ball = given.coordinates(Ball.exact(y), Ball.exact(w))
     assert np.all(np.abs(ball.mid - expected) <= 1e-12 * np.max(np.abs(expected)))
     border, step = rng.normal(size=7), rng.normal(size=7)
-    change = given.placed(x + step) - given.placed(x)
-    assert given.border_of_forces(border) @ step == pytest.approx(border @ change, rel=1e-10)
-    assert given.border_of_zeta(given.border_of_forces(border)) == pytest.approx(border, rel=1e-10)
+    change = placed(given, x + step) - placed(given, x)
+    assert border_of_forces(given, border) @ step == pytest.approx(border @ change, rel=1e-10)
+    assert border_of_zeta(given, border_of_forces(given, border)) == pytest.approx(border, rel=1e-10)
 
 
 def test_what_is_past_the_limit_of_stick_is_bounded_along_a_direction():
@@ -117,7 +125,7 @@ def test_friction_may_be_negative_beside_the_interval():
     curve = only_curve(GIVEN, box_of(GIVEN, start, 0.01))
     assert curve.alphas[0] < 0 < curve.alphas[1]
     at = curve.at(0.0)
-    assert np.all(np.abs(at.mid - GIVEN.placed(start)) <= at.rad + 1e-14)
+    assert np.all(np.abs(at.mid - placed(GIVEN, start)) <= at.rad + 1e-14)
 
 
 @pytest.mark.slow
@@ -136,7 +144,7 @@ def test_solutions_in_a_box_are_those_of_its_curve(seed):
     seen = 0
     for alpha in np.linspace(low, high, 9):
         for other in enumsol.enumerate_roots(problem, Fraction(float(alpha))):
-            x = Ball(given.placed(np.append(forces(other), alpha)), np.full(7, 1e-12))
+            x = Ball(placed(given, np.append(forces(other), alpha)), np.full(7, 1e-12))
             if lies_in(box, x):
                 at = curve.at(parameter_in(box, x))
                 assert np.all(np.abs(at.mid - x.mid) <= at.rad + x.rad)
@@ -157,6 +165,29 @@ def test_what_is_no_box_is_refused(box):
         assert only_curve(GIVEN, replace(box, **wrong)) is None
 
 
+def test_both_components_of_a_tangential_force_have_one_step():
+    """With two the natural map has another curve of zeros, which are no solutions (theory, (12.16))."""
+
+    def found(ratio, steps):
+        low, x, high = (placed(GIVEN, np.append(sliding_node(alpha, ratio), alpha)) for alpha in (0.49, 0.5, 0.51))
+        box = CurveBox(x, (high - low) / 0.02, np.eye(4)[3], 0.01, np.full(4, 0.05), np.array(steps))
+        return only_curve(GIVEN, box)
+
+    for steps in ([1.0, 1.0, 1.0], [2.0, 1.5, 1.5]):
+        at = found(1.0, steps).at(0.0)
+        assert np.all(np.abs(at.mid - sliding(0.5)) <= at.rad + 1e-12)
+    for ratio in (1.0, 8.0):
+        for steps in ([1.0, 1.0, 8.0], [1.0, 0.125, 1.0], [1.0, 1.0, 1.0 + 2.0**-52]):
+            assert found(ratio, steps) is None
+
+
+def test_steps_of_the_coordinates_that_are_none():
+    for factors in ([1, 1, 8], [1, 0.125, 1], [0, 1, 1], [1, -1, -1], [np.nan, 1, 1], [np.inf, 1, 1]):
+        with pytest.raises(NotEnclosedError, match=r"steps|told apart"):
+            AlphaProblem.of(SLIDING.enclosure, GIVEN.steps * factors)
+    assert AlphaProblem.of(SLIDING.enclosure, GIVEN.steps * [3, 2, 2]).steps == pytest.approx(GIVEN.steps * [3, 2, 2])
+
+
 def test_a_fold_lies_in_a_box():
     # the gallery's node sticks up to a fold, and slips back from it
     problem = enumsol.gallery.get("one-node-3d-3").build().replace(friction=0.0, friction_slope=1.0)
@@ -165,7 +196,7 @@ def test_a_fold_lies_in_a_box():
     path = enumsol.follow(problem, jammed, -jammed.index, (0.5, 6))
     (fold,) = path.folds
     k = fold.point
-    line = given.placed(np.column_stack([path.lambda_n, *np.moveaxis(path.lambda_t, 2, 0), path.alpha]))
+    line = placed(given, np.column_stack([path.lambda_n, *np.moveaxis(path.lambda_t, 2, 0), path.alpha]))
     before, after = (line[k] + 1e-3 * (line[n] - line[k]) for n in (k - 1, k + 1))
     ahead, behind = (one / np.linalg.norm(one) for one in (line[k] - before, after - line[k]))
     border = (ahead + behind) / np.linalg.norm(ahead + behind)
@@ -178,7 +209,7 @@ def test_a_fold_lies_in_a_box():
     counts = []
     for alpha in (fold.alpha + side, fold.alpha - side):
         roots = enumsol.enumerate_roots(problem, Fraction(alpha))
-        inside = [root for root in roots if lies_in(box, Ball.exact(given.placed(np.append(forces(root), alpha))))]
+        inside = [root for root in roots if lies_in(box, Ball.exact(placed(given, np.append(forces(root), alpha))))]
         counts.append(len(inside))
     assert counts == [2, 0]
 

@@ -19,6 +19,7 @@ from enumsol.search.space.space_setup import SpaceSolvers
 from enumsol.trusted.space import sector_rows as sr
 from enumsol.trusted.space.leaf_equations import Leaf
 from enumsol.trusted.space.leaves import SpaceRoot, _cut, distinct_roots, same_root, settle
+from enumsol.trusted.space.sector_margins import space_margin
 
 TAU_ONE = np.array([[1, 2]])
 
@@ -241,7 +242,7 @@ def test_margins_are_below_the_energy():
         rows = [row for row in ROWS if sr.row_sign(code, row) != sr.FORBIDDEN]
         values = np.array([rng.normal() if sr.row_sign(code, row) == sr.FREE else rng.random() for row in rows])
         values *= 10.0 ** rng.integers(-4, 1)
-        margin = sr.sector_margin(system, (code,), rows, values)
+        margin = space_margin(system, (code,), rows, values)
         assert margin <= y @ S @ y - g @ y + 1e-12
         positive += margin > -1
     assert positive
@@ -257,7 +258,7 @@ def test_rows_that_a_status_lacks_or_of_the_wrong_sign():
         (sr.STICK, (sr.TANGENT, 0, 4), -1.0),
         (sr.STICK, (sr.FORCE, 0, 0), np.nan),
     ):
-        assert sr.sector_margin(system, (code,), [row], np.array([value])) == -np.inf
+        assert space_margin(system, (code,), [row], np.array([value])) == -np.inf
     for row in ((sr.END, 0, 1), (sr.ALONG, 0, 1), (sr.TANGENT, 0, 3)):
         with pytest.raises(ValueError, match="no such row"):
             sr.sector_row_terms(row, TAU_ONE, 3)

@@ -12,8 +12,8 @@ from floating_space import known_body, newton_solutions
 
 from enumsol.model.sectors import SECTORS, direction, end_number
 from enumsol.model.statuses import CONTACT, OPEN, STICK, UNDECIDED
-from enumsol.search.space.space_floating import FloatingSpaceSolvers
 from enumsol.search.space.space_references import proposed
+from enumsol.search.space.space_setup import SpaceSolvers
 from enumsol.trusted.space.sector_rows import GAP, LEFT, RIGHT
 
 FRICTIONS = ((0.3, 1.0), (1.0, 3.0), (3.0, 8.0))
@@ -25,7 +25,7 @@ def body(seed):
     p = int(rng.integers(1, 4))
     most = 3 * p if p == 1 else 6
     problem = known_body(seed, p, int(rng.integers(1, most + 1)), frictions=FRICTIONS[seed % 3]).problem
-    solvers = FloatingSpaceSolvers(problem, 0, "verified")
+    solvers = SpaceSolvers(problem, 0, "verified")
     leaf = solvers.known_root
     return problem, solvers.system.force, None if leaf is None else solvers.certifier(None).reference(leaf)
 

@@ -12,7 +12,7 @@ if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
     from enumsol.branches.elements import Arc
-    from enumsol.roots.root import ContactState
+    from enumsol.roots.local_branch import ContactState
     from enumsol.support.array_types import Floats, Indices
 
 

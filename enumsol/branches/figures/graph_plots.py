@@ -8,14 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from enumsol.branches.figures.curves import (
-    Curve,
-    Quantity,
-    curves,
-    quantity_of,
-    side_by_side,
-    state_columns,
-)
+from enumsol.branches.figures.curves import Curve, Quantity, curves, quantity_of, side_by_side, state_columns
 from enumsol.branches.figures.panels import (
     GREY,
     MARKERS,

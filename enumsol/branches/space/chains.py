@@ -17,9 +17,10 @@ from enumsol.continuation.continuation_options import ContinuationOptions
 from enumsol.continuation.path import follow
 from enumsol.continuation.path_data import PathStatus
 from enumsol.errors import EnumsolError, Interrupted, OutOfMemoryError
+from enumsol.search.space.curve_proposals import corner_steps, curve_around, curve_point, placed, stretch
 from enumsol.support.deadlines import TimeOverError, look, tell
 from enumsol.trusted.space.curve_chains import CurveChain, CurveLink, goes_on, link_between
-from enumsol.trusted.space.solution_curve import corner_steps, curve_around, curve_point, only_curve
+from enumsol.trusted.space.solution_curve import only_curve
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Sequence
@@ -29,7 +30,8 @@ if TYPE_CHECKING:
 
     from enumsol.continuation.path import Path
     from enumsol.model.problem3d import ContactProblem3D
-    from enumsol.trusted.space.solution_curve import AlphaProblem, CurvePoint, SolutionCurve
+    from enumsol.search.space.curve_proposals import CurvePoint
+    from enumsol.trusted.space.solution_curve import AlphaProblem, SolutionCurve
 
     Array = NDArray[np.float64]
 
@@ -41,6 +43,8 @@ _SHORTEST = 1e-7
 #: Which share of what seems possible is taken at first as the way between two joints, and how the way shrinks at least:
 #: with more of the first boxes fail more often, with less they are many.
 _TRUST, _SHRINK = 0.95, 0.5
+#: How far a skeleton is prolonged beyond the interval, relative to its last step: more only takes time.
+_BEYOND = 0.05
 
 
 @dataclass(frozen=True, eq=False)
@@ -124,7 +128,7 @@ def skeleton_through(problem: ContactProblem3D, x: Array, span: tuple[float, flo
     for k, (line, path) in enumerate(zip(lines, paths, strict=True)):
         if path.status in (PathStatus.INTERVAL_LEFT, PathStatus.RIGID_BOUND):
             # relative to the last step
-            beyond = 0.05 if path.status == PathStatus.INTERVAL_LEFT else 2.0**-10
+            beyond = _BEYOND if path.status == PathStatus.INTERVAL_LEFT else 2.0**-10
             lines[k] = np.vstack([line, line[-1] + beyond * (line[-1] - line[-2])])
     back, last = lines[0][::-1], len(lines[0]) - 1
     places = {last - k for k in corners[0]} | {last + k for k in corners[1]}
@@ -179,7 +183,7 @@ class ChainBuilder:
 
     def chain(self, skeleton: Skeleton) -> CurveChain | None:
         """A chain along a skeleton, as far as it is proven; if that is not to its start, from there both ways."""
-        skeleton = replace(skeleton, points=self.problem.placed(skeleton.points))
+        skeleton = replace(skeleton, points=placed(self.problem, skeleton.points))
         self._links, self._joints = [], []
         if not self._put(skeleton):
             self._links, self._joints = [], []
@@ -314,7 +318,7 @@ class ChainBuilder:
                 links.append(found[0])
                 joints.append(found[1])
             trust = 0.85 * trust if failed else min(1.05 * trust, _TRUST)
-            way = (further - place) * min(max(trust * found[0].curve.stretch, _SHRINK), 8.0)
+            way = (further - place) * min(max(trust * stretch(found[0].curve), _SHRINK), 8.0)
             place, failed = further, False
         return place
 

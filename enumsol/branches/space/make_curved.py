@@ -14,8 +14,9 @@ from enumsol.arithmetic.rationals import rational
 from enumsol.branches.elements import Arc, ArcValues, VertexKind, make_vertex, sides_of, tangential, with_exact_zeros
 from enumsol.branches.unfinished import END_ELSEWHERE, TOLD_APART
 from enumsol.model.statuses import ContactStatus, space_status
+from enumsol.search.space.curve_proposals import border_of_forces, border_of_zeta, curve_point, placed, unplaced
 from enumsol.trusted.space.curve_parts import Run, Turn, ends_of, side_of
-from enumsol.trusted.space.solution_curve import AlphaProblem, curve_point
+from enumsol.trusted.space.solution_curve import AlphaProblem
 
 if TYPE_CHECKING:
     from collections.abc import Sequence, Set
@@ -55,14 +56,14 @@ class CurvedArcValues(ArcValues):
         if not 0 <= k < len(self.borders):
             return np.asarray(self.knots[max(0, min(k, len(self.borders)))])
         start, end, border = self.knots[k], self.knots[k + 1], self.borders[k]
-        row = self.given.border_of_zeta(border)
+        row = border_of_zeta(self.given, border)
         low, high, share = 0.0, 1.0, float((alpha - start[-1]) / (end[-1] - start[-1]))
         x: Floats = start + share * (end - start)
         for _ in range(60):
-            found = curve_point(self.given, self.given.placed(start + share * (end - start)), row)
+            found = curve_point(self.given, placed(self.given, start + share * (end - start)), row)
             if found is None:
                 break
-            x, off = self.given.unplaced(found.x), float(found.x[-1] - alpha)
+            x, off = unplaced(self.given, found.x), float(found.x[-1] - alpha)
             if abs(off) <= 2.0**-50 * max(1.0, abs(alpha)):
                 break
             low, high = (share, high) if off < 0 else (low, share)
@@ -247,13 +248,13 @@ class CurvedGraph:
                 f"{END_ELSEWHERE}",
                 turn.alphas,
             )
-        x, bounded = self.given.unplaced(turn.x), turn.bounded
+        x, bounded = unplaced(self.given, turn.x), turn.bounded
         self._places.append(_Place(alphas, x, turn.selections, border=False, settled=settled, bounded=bounded))
         return len(self._places) - 1
 
     def _values(self, run: Run) -> CurvedArcValues:
-        knots = self.given.unplaced(np.array(run.knots)[:: run.rises])
-        borders = self.given.border_of_forces(np.array(run.borders)[:: run.rises])
+        knots = unplaced(self.given, np.array(run.knots)[:: run.rises])
+        borders = border_of_forces(self.given, np.array(run.borders)[:: run.rises])
         return CurvedArcValues(self.given, self.problem, run.codes, knots, borders)
 
     # -- in the user's terms ---------------------------------------------------------------------------------------

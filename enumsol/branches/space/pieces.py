@@ -14,20 +14,22 @@ import numpy as np
 from scipy.optimize import brentq
 
 from enumsol.proof.curve_records import CurveBoxRecord, CurvePart
+from enumsol.search.space.curve_proposals import curve_around, curve_point
 from enumsol.support.deadlines import look, tell
 from enumsol.trusted.space.curve_events import CurveMotion
 from enumsol.trusted.space.curve_parts import LinkParts, Place, Run, Turn, in_order, put_behind, up_to_bound
 from enumsol.trusted.space.sector_rows import OPEN, STICK
-from enumsol.trusted.space.solution_curve import SLIP, curve_around, curve_point
+from enumsol.trusted.space.solution_curve import SLIP
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
 
     from numpy.typing import NDArray
 
+    from enumsol.search.space.curve_proposals import CurvePoint
     from enumsol.selections.solution import Codes
     from enumsol.trusted.space.curve_chains import CurveChain, CurveLink
-    from enumsol.trusted.space.solution_curve import AlphaProblem, CurvePoint, SolutionCurve
+    from enumsol.trusted.space.solution_curve import AlphaProblem, SolutionCurve
 
     Array = NDArray[np.float64]
 

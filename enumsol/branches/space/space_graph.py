@@ -29,7 +29,6 @@ from enumsol.roots.space_roots import SpaceEnumeration
 from enumsol.search.outcome import Stop, StopReason
 from enumsol.search.space.known_curves import Curves, joined
 from enumsol.search.space.piece_tree import OpenLeaf, PieceTree, SpreadPieces
-from enumsol.search.space.space_floating import FloatingSpaceSolvers
 from enumsol.search.space.space_setup import SpaceSolvers
 from enumsol.support.deadlines import TimeOverError, look, remaining, within
 from enumsol.support.messages import counted
@@ -364,8 +363,7 @@ def roots_on_arcs(
     """
     numbers = {v.number for v in vertices}
     arcs = [*arcs, *(arc for arc in data.arcs if numbers & {arc.tail, arc.head})]
-    made = SpaceSolvers if data.problem.held else FloatingSpaceSolvers
-    solvers = made(data.problem, alpha, "verified")
+    solvers = SpaceSolvers(data.problem, alpha, "verified")
     enumeration = SpaceEnumeration(solvers, None, None)
     leaves: list[tuple[Codes, SpaceRoot]] = []
     undecided: list[Undecided] = []

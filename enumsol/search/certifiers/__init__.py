@@ -1,1 +1,1 @@
-"""What each arithmetic lets a search conclude."""
+"""Certifiers: conclusions that each arithmetic allows a search."""

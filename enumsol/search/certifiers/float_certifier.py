@@ -1,4 +1,4 @@
-"""What each arithmetic lets the tree conclude: prunings accepted, complete selections decided."""
+"""The certifier of arithmetic "fast": prunings accepted, complete selections decided in floats."""
 
 from __future__ import annotations
 
@@ -8,14 +8,14 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from enumsol.relaxation.engine import PRUNE_MARGIN
-from enumsol.search.certifiers.protocol import Bound, UndecidedPart, WithoutProof, margin_of_form
-from enumsol.search.fathoming import Proposal, holds_below, without_load
+from enumsol.search.certifiers.protocol import Bound, Certifier, UndecidedPart, margin_of_form
+from enumsol.search.fathoming import holds_below, without_load
 from enumsol.search.reduction import NEAR
 from enumsol.selections.solution import SelectionSolution, SelectionSolver, VertexLimitError
 
 if TYPE_CHECKING:
     from enumsol.search.certifiers.protocol import Margin
-    from enumsol.search.fathoming import Point
+    from enumsol.search.reduction import Point, Proposal
     from enumsol.selections.float_selections import FloatSelections
     from enumsol.support.array_types import Codes
     from enumsol.trusted.quadratic_forms import EnclosedForm
@@ -35,13 +35,14 @@ def solve_or_open(solver: SelectionSolver, codes: Codes) -> SelectionSolution | 
         return UndecidedPart(codes, str(error), "perturb the load or the friction coefficient", examined=True)
 
 
-class FastCertifier(WithoutProof):
+class FastCertifier(Certifier):
     """Floats and tolerances: the result of the engine is trusted unless the tolerance could overturn it.
 
     A condition within the tolerance of zero counts as satisfied. Shifting every row of a certificate by twice that
     changes its bound by the multipliers times the shift; a pruning that does not survive it is branched on.
     """
 
+    writes = False
     # with other numbers forms are definite where they nearly are not: several points may hold within the tolerance
     plain = True
 

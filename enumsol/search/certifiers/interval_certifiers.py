@@ -2,15 +2,14 @@
 
 from __future__ import annotations
 
-from functools import partial
 from typing import TYPE_CHECKING, Any
 
 from enumsol.arithmetic.rationals import rational
 from enumsol.condensation.enclosure import CondensedEnclosure, NotEnclosedError, enclosure_of
 from enumsol.condensation.exact import ExactCondensed, ExactSystem
 from enumsol.model.statuses import RowKind
+from enumsol.relaxation.active_set import IntervalRowKind, IntervalSystem, interval_rows
 from enumsol.relaxation.imposed_rows import with_implied
-from enumsol.relaxation.interval_relaxation import IntervalRowKind, IntervalSystem, interval_rows
 from enumsol.search.certifiers.protocol import FORM_ERRORS, energy_margin
 from enumsol.search.certifiers.rational_certifier import accepted, energy_bound_positive
 from enumsol.search.subintervals import IntervalCertifier, Piece
@@ -55,14 +54,14 @@ class VerifiedIntervalCertifier(IntervalCertifier):
         exactly = exact is None or exact.condensed_exactly
         self._enclosure = certified_enclosure(problem, exactly=exactly)
         self._rationals = ExactIntervalCertifier(exact) if exact is not None and exactly else None
-        self._zero, self._held = zero if exact is None else exact.zero, problem.held
+        self._zero = zero if exact is None else exact.zero
         self._piece: tuple[Piece, EnclosedPiece | None, Margin | None] | None = None
         self._form: tuple[Floats, EnclosedPiece] | None = None
         #: Rationals decide where there are no balls; the checker repeats what balls accepted.
         self.forms, self.rational, self.checkable = problem.held, self._rationals is not None, True
 
     def excluded(self, piece: Piece, system: IntervalSystem, leaf: EmptyLeaf) -> bool:
-        """Whether the dual bounds at both ends of the piece are positive."""
+        """True if the dual bounds at both ends of the piece are positive."""
         enclosed, margin = self._on(piece, system)
         if enclosed is not None and leaf.form is not None:
             within = self._with_form(enclosed, leaf.form)
@@ -75,7 +74,7 @@ class VerifiedIntervalCertifier(IntervalCertifier):
         return self._rationals.excluded(piece, system, leaf)
 
     def convex(self, piece: Piece, system: IntervalSystem, form: Floats) -> bool:
-        """Whether the form of these multipliers is proven convex on the piece, for all data in the balls."""
+        """True if the form of these multipliers is proven convex on the piece, for all data in the balls."""
         enclosed = self._on(piece, system)[0]
         if enclosed is None:
             return False
@@ -89,12 +88,8 @@ class VerifiedIntervalCertifier(IntervalCertifier):
     def _on(self, piece: Piece, system: IntervalSystem) -> tuple[EnclosedPiece | None, Margin | None]:
         if self._piece is None or self._piece[0] != piece:
             enclosed = self._make(piece, system)
-            self._piece = (piece, enclosed, None if enclosed is None else self._margin(enclosed))
+            self._piece = (piece, enclosed, None if enclosed is None else energy_margin(enclosed))
         return self._piece[1:]
-
-    def _margin(self, enclosed: EnclosedPiece) -> Margin:
-        # the compiled margins know no rows of a body as a whole
-        return energy_margin(enclosed) if self._held else partial(exclusion_margin, enclosed, errors=2.0)
 
     def _make(self, piece: Piece, system: IntervalSystem) -> EnclosedPiece | None:
         if self._enclosure is None:
@@ -139,7 +134,7 @@ class ExactIntervalCertifier(IntervalCertifier):
         self._systems: tuple[Piece, list[tuple[ExactSelections, ExactSelections]]] | None = None
 
     def excluded(self, piece: Piece, system: IntervalSystem, leaf: EmptyLeaf) -> bool:
-        """Whether the dual bounds at both ends of the piece are positive."""
+        """True if the dual bounds at both ends of the piece are positive."""
         if self._inverse is None:
             self._inverse = self._exact.S.inv()
         if self._systems is None or self._systems[0] != piece:
@@ -174,7 +169,7 @@ class ExactIntervalCertifier(IntervalCertifier):
         return [exact.at(rational(end))[0] for end in (ends if exact.loaded else ends[:1])]
 
     def _positive(self, terms: list[tuple[int, int, Any]], lowest: ExactSelections, highest: ExactSelections) -> bool:
-        """Whether the energy is bounded below by a positive number, at one g and for all friction of the piece."""
+        """True if the energy is bounded below by a positive number, at one g and for all friction of the piece."""
         forms = (
             # lambda_t - F_lo lambda_n is the cone's row of F_lo with its sign changed
             (-u, lowest.form(_CONES[kind], node)) if kind in _CONES else (u, highest.form(RowKind(kind), node))

@@ -1,10 +1,11 @@
-"""What every certifier offers to the search, and what those have in common that write a proof or none.
+"""The base of all certifiers, what they take and give, and how proposals are proven to exclude an assignment.
 
 The exclusion inequalities are compiled here, if that module is installed, else those of the trusted core.
 """
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from dataclasses import dataclass, field, fields
 from functools import partial
 from typing import TYPE_CHECKING, Any, Protocol
@@ -22,6 +23,8 @@ if TYPE_CHECKING:
     from enumsol.condensation.enclosure import EnclosedSystem
     from enumsol.proof.records import DeclaredForm
     from enumsol.proof.writer import Part, Recorder
+    from enumsol.search.fathoming_in_contact import LoneProposal
+    from enumsol.search.reduction import Point, Proposal
     from enumsol.support.array_types import Codes, Floats, Indices
     from enumsol.trusted.quadratic_forms import EnclosedForm
 
@@ -63,7 +66,7 @@ class Refine:
 
 @dataclass
 class Escalations:
-    """How many selections and prunings needed which arithmetic.
+    """Counts of the selections and prunings that needed each arithmetic.
 
     Attributes
     ----------
@@ -89,7 +92,7 @@ class Escalations:
 
 @dataclass(frozen=True)
 class Certified:
-    """What a certifier has proven; of one that writes no proof, nothing.
+    """Conclusions of a certifier; of one that writes no proof, nothing.
 
     Attributes
     ----------
@@ -110,7 +113,7 @@ class Certified:
 
 
 class Bound(Protocol):
-    """What a relaxation, or a record of an earlier proof, says of a partial assignment without a solution."""
+    """Multipliers of a relaxation, or of a record of an earlier proof, for an assignment without a solution."""
 
     @property
     def bound(self) -> float:
@@ -145,46 +148,6 @@ class RecordedBound:
 NO_BOUND = RecordedBound(np.zeros(0, dtype=np.intp), np.zeros(0))
 
 
-class Certifier(Protocol):
-    """Decides in one arithmetic what the tree may conclude, and writes the proof, if one is wanted.
-
-    Attributes
-    ----------
-    recorder : Recorder
-        Where the records of the proof go.
-    sliding : dict
-        FORWARD or BACKWARD for nodes that touch without load and slide at a solution met (theory, section 6.11).
-    """
-
-    recorder: Recorder
-    sliding: dict[int, int]
-
-    @property
-    def certified(self) -> Certified:
-        """What was proven so far."""
-
-    def excluded(self, codes: Codes, relaxation: Bound) -> bool:
-        """Whether the relaxation's multipliers prove that the partial assignment holds no solution."""
-
-    def selection(self, codes: Codes) -> Any:
-        """All roots in a complete selection, None when it holds none, why that is open, or what to split further."""
-
-    def branching(self, node: int, children: Sequence[int]) -> None:
-        """Record that a partial assignment is split at ``node`` (called in preorder, for the proof)."""
-
-    def skipped(self, codes: Codes, reason: str) -> None:
-        """Record that a subtree was not examined, and why."""
-
-    def unloaded(self) -> None:
-        """Record that the body is unloaded, which decides the whole tree."""
-
-    def add(self, part: Certified) -> None:
-        """Take over what the certifier of a subtree has proven; its records were written already."""
-
-    def forget(self) -> None:
-        """Forget what was proven, as the search begins again; its records were dropped already."""
-
-
 class Unrecorded:
     """A recorder for searches without a proof."""
 
@@ -195,102 +158,116 @@ class Unrecorded:
         """Nothing to write."""
 
 
-class Met:
-    """Base of all certifiers: what they have met so far, beside what they have proven.
-
-    Attributes
-    ----------
-    sliding : as of Certifier
-    bounded : bool
-        Of a body that nothing holds: some conclusion rests on the bound of its rigid displacement.
-    """
-
-    def __init__(self) -> None:
-        self.sliding: dict[int, int] = {}
-        self.bounded = False
-
-    def add(self, part: Certified) -> None:
-        """Take over what the certifier of a subtree has met."""
-        self.sliding |= part.sliding
-        self.bounded |= part.bounded
-
-
-class WithoutProof(Met):
-    """Base of certifiers that write no proof."""
-
-    recorder: Recorder = Unrecorded()
-    hard = False
-    exactly, plain, lone = True, False, False
-
-    @property
-    def certified(self) -> Certified:
-        """Nothing is proven."""
-        return Certified(sliding=self.sliding, bounded=self.bounded)
-
-    def _nothing(self, *_: object, **__: object) -> None:
-        """There is nothing to write, and nothing to forget."""
-
-    branching = skipped = unloaded = forget = _nothing
-
-
-class RecordingCertifier(Met):
-    """Base of these certifiers: it writes what needs no proof, and keeps count.
+class Certifier(ABC):
+    """Decides in one arithmetic what the tree may conclude, and writes the proof, if one is wanted.
 
     Parameters
     ----------
-    recorder : Recorder
+    recorder : Recorder, optional
         Where the records of the proof go.
+
+    Attributes
+    ----------
+    sliding : dict
+        FORWARD or BACKWARD for nodes that touch without load and slide at a solution met (theory, section 6.11).
+    bounded : bool
+        Of a body that nothing holds: some conclusion rests on the bound of its rigid displacement.
+    hard : bool
+        A complete selection was met that is degenerate, or nearly so.
     """
 
+    #: It writes a proof, and keeps what it has proven; otherwise nothing is.
+    writes = True
+    #: Of closing subtrees: it knows a solution exactly, so that statuses need not hold strictly; it takes plain numbers
+    #: only, mu = kappa = 1 and nu = 0; it can prove that a regular root is alone.
+    exactly, plain, lone = True, False, False
+    hard = False
     _escalations: Escalations | None = None
 
-    def __init__(self, recorder: Recorder) -> None:
-        super().__init__()
-        self.recorder = recorder
+    def __init__(self, recorder: Recorder | None = None) -> None:
+        self.recorder: Recorder = Unrecorded() if recorder is None else recorder
+        self.sliding: dict[int, int] = {}
+        self.bounded = False
         self._verified: dict[Codes, Any] = {}
         self._leaves = 0
         #: Forms that were declared, by what they are known by, and how many were before each.
         self._declared: dict[Any, int] = {}
 
+    # -- what is concluded -----------------------------------------------------------------------------------------
+
+    @abstractmethod
+    def excluded(self, codes: Codes, relaxation: Bound) -> bool:
+        """True if the relaxation's multipliers prove that the partial assignment holds no solution."""
+
+    @abstractmethod
+    def selection(self, codes: Codes) -> Any:
+        """All roots in a complete selection, None when it holds none, why that is open, or what to split further."""
+
+    def closed(self, codes: Codes, proposal: Proposal | None, near: Point) -> list[Any] | None:
+        """The solutions below a partial assignment, none or one, if it can hold one only; None if not proven.
+
+        Parameters
+        ----------
+        codes : of the assignment
+        proposal : what may close it, if anything was found
+        near : lambda and w from which its solution was sought
+        """
+        del codes, proposal, near
+        return None
+
+    def alone(self, codes: Codes, proposal: LoneProposal, bound: Bound) -> list[Any] | None:
+        """The root of what is proposed, if it is proven to be the only one below a partial assignment; else None."""
+        del codes, proposal, bound
+        return None
+
+    # -- the proof -------------------------------------------------------------------------------------------------
+
     @property
     def certified(self) -> Certified:
-        """What was proven so far."""
+        """Conclusions so far."""
         return Certified(self._verified, self._escalations, self._leaves, self.sliding, self.bounded)
 
     def branching(self, node: int, children: Sequence[int]) -> None:
-        """Write a branching of the tree."""
-        self.recorder.write(Branching(node, list(children)).write())
+        """Record that a partial assignment is split at ``node`` (called in preorder, for the proof)."""
+        if self.writes:
+            self.recorder.write(Branching(node, list(children)).write())
 
     def skipped(self, codes: Codes, reason: str) -> None:
-        """Write a subtree that was not examined."""
+        """Record that a subtree was not examined, and why."""
         self._leaf(UndecidedRecord(reason))
 
     def unloaded(self) -> None:
-        """Write the proof of the unloaded body."""
+        """Record that the body is unloaded, which decides the whole tree."""
         self._leaf(Unloaded())
 
     def add(self, part: Certified) -> None:
-        """Take over what the certifier of a subtree has proven."""
-        super().add(part)
+        """Take over what the certifier of a subtree has proven; its records were written already."""
+        self.sliding |= part.sliding
+        self.bounded |= part.bounded
+        if not self.writes:
+            return
         self._verified |= part.verified
         self._leaves += part.leaves
+        if self._escalations is not None and part.escalations is not None:
+            self._escalations.add(part.escalations)
         self._declared.clear()  # it may have declared others
 
     def forget(self) -> None:
-        """Forget what was proven."""
-        self._verified, self._leaves, self.bounded = {}, 0, False
+        """Forget what was proven, as the search begins again; its records were dropped already."""
+        self._verified, self._leaves, self.bounded = {}, 0, self.bounded and not self.writes
         self._declared.clear()
 
     def _back(self, form: Any, declaration: Callable[[], DeclaredForm]) -> int:
-        """How many forms ago one was declared, 1 for the last; one that was not is declared."""
+        """Number of forms since one was declared, 1 for the last; one that was not is declared."""
         if form not in self._declared:
             self._declared[form] = len(self._declared)
             self.recorder.write(declaration().write())
         return len(self._declared) - self._declared[form]
 
     def _leaf(self, leaf: Record) -> None:
-        self._leaves += 1
-        self.recorder.write(leaf.write())
+        if self.writes:
+            self._leaves += 1
+            self.recorder.write(leaf.write())
 
 
 #: How often the error bound of an exclusion with a form is subtracted where a proof is written.
@@ -299,10 +276,14 @@ FORM_ERRORS = 4.0
 
 def energy_margin(within: EnclosedSystem | EnclosedPiece) -> Margin:
     """Lower bounds on the energy, less twice the error bound (theory, sections 6.2 and 7.9)."""
+    plain = partial(exclusion_margin, within, errors=2.0)
+    # the compiled margins know no rows of a body as a whole
+    if not (within.ends[0] if isinstance(within, EnclosedPiece) else within).held:
+        return plain
     try:
         from enumsol.search.certifiers._margin import Margins
     except ImportError:
-        return partial(exclusion_margin, within, errors=2.0)
+        return plain
     if isinstance(within, EnclosedPiece):
         return Margins(within.ends, within.low, within.high).margin
     return Margins((within,), within.F, within.F).margin

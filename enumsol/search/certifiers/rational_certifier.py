@@ -13,8 +13,8 @@ from enumsol.arithmetic.rationals import rational
 from enumsol.model.statuses import CONDITIONS, OPEN, SLIDING, RowKind
 from enumsol.relaxation.imposed_rows import INEQUALITY, imposed_rows
 from enumsol.search.certifiers.float_certifier import solve_or_open
-from enumsol.search.certifiers.protocol import Bound, UndecidedPart, WithoutProof
-from enumsol.search.fathoming import Proposal, holds_below, propose
+from enumsol.search.certifiers.protocol import Bound, Certifier, UndecidedPart
+from enumsol.search.fathoming import holds_below, propose
 from enumsol.selections.solution import SelectionSolution
 from enumsol.support.deadlines import look
 from enumsol.trusted.uniqueness import only_solution
@@ -23,12 +23,14 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Iterator, Mapping
 
     from enumsol.condensation.condensed import ScaledSystem
-    from enumsol.condensation.enclosure import EnclosedSystem
-    from enumsol.search.fathoming import Point
+    from enumsol.search.certifiers.exclusions import Exclusions
+    from enumsol.search.reduction import Point, Proposal
+    from enumsol.search.reference_closer import OnlyRoot
     from enumsol.selections.polytopes import Form
     from enumsol.selections.rational_selections import ExactSelections
     from enumsol.support.array_types import Codes, Floats, Indices
     from enumsol.trusted.at_alpha import VerifiedSelection
+    from enumsol.trusted.reference import Reference
 
 
 _NEWTON_STEPS = 8
@@ -49,7 +51,7 @@ def accepted(
 
 
 def energy_bound_positive(g: tuple[Any, ...], inverse: Any, terms: Iterable[tuple[Any, Form]]) -> bool:
-    """Whether -1/4 v' S^-1 v - sum u * constant > 0 with v = g + sum u * form, for multipliers u of affine forms."""
+    """True if -1/4 v' S^-1 v - sum u * constant > 0 with v = g + sum u * form, for multipliers u of affine forms."""
     v, total = list(g), fmpq(0)
     for u, (form, constant) in terms:
         v = [a + u * b for a, b in zip(v, form, strict=True)]
@@ -58,36 +60,58 @@ def energy_bound_positive(g: tuple[Any, ...], inverse: Any, terms: Iterable[tupl
     return bool(4 * total > (column.transpose() * (inverse * column))[0, 0])
 
 
-class ExactCertifier(WithoutProof):
+class ExactCertifier(Certifier):
     """Rationals: a pruning needs multipliers whose dual bound is positive, exactly (theory, (6.1)).
+
+    Of a body that nothing holds balls prove prunings as well (theory, section 14.3).
 
     Parameters
     ----------
     selections : ExactSelections
     scaled : ScaledSystem
-    enclosed : EnclosedSystem or None
-        Balls for it; without them no subtree is closed.
+    exclusions : Exclusions or None
+        With balls for it; without them no subtree is closed.
     precisely : callable giving the verified solution of a complete selection in many digits, or None
         Asked first whether a selection is worth being solved in rationals.
     """
+
+    writes = False
 
     def __init__(
         self,
         selections: ExactSelections,
         scaled: ScaledSystem,
-        enclosed: EnclosedSystem | None = None,
-        precisely: Callable[[Codes], VerifiedSelection | None] = lambda _: None,
+        exclusions: Exclusions | None = None,
+        precisely: Callable[[Codes], VerifiedSelection | None] | None = None,
     ) -> None:
         self._selections = selections
         self._precisely = precisely
         self._scaled = scaled
-        self._enclosed = enclosed
+        self._exclusions = exclusions
         super().__init__()
         self._inverse: Any = None
 
     def selection(self, codes: Codes) -> SelectionSolution | UndecidedPart | None:
         """All roots in the selection."""
-        return solve_or_open(self._selections, codes)
+        found = solve_or_open(self._selections, codes)
+        if not isinstance(found, UndecidedPart) and not self.bounded:
+            self.bounded = self._selections.rests_on_reach(codes, found)
+        return found
+
+    def reference(self, selection: Codes) -> Reference | None:
+        """The form of a root of a body that nothing holds, if one is proven definite."""
+        return None if self._exclusions is None else self._exclusions.reference(selection)
+
+    def only_root(self, codes: Codes, reference: Reference, proposal: OnlyRoot) -> list[SelectionSolution] | None:
+        """The roots below an assignment, that of a form or none; None if that is not proven."""
+        exclusions = self._exclusions
+        needs = None if exclusions is None else exclusions.only_root(codes, reference, proposal, within=self.bounded)
+        if needs is None:
+            return None
+        if not reference.lies_below(codes):
+            return []
+        root = solve_or_open(self._selections, reference.selection)
+        return [root] if isinstance(root, SelectionSolution) else None
 
     def closed(self, codes: Codes, proposal: Proposal | None, near: Point) -> list[SelectionSolution] | None:
         """The solutions below a partial assignment, none or one, if it can hold one only; None if not proven."""
@@ -95,11 +119,11 @@ class ExactCertifier(WithoutProof):
         return None if found is None else found[1]
 
     def closing(self, codes: Codes, near: Point) -> tuple[Proposal, list[SelectionSolution]] | None:
-        """What closes a subtree, and the solutions in it, sought near a point (theory, section 6.11)."""
+        """Proposal that closes a subtree, and the solutions in it, sought near a point (theory, section 6.11)."""
         return self._closing(codes, propose(self._scaled, codes, near, exactly=True))
 
     def _closing(self, codes: Codes, proposal: Proposal | None) -> tuple[Proposal, list[SelectionSolution]] | None:
-        if self._enclosed is None or proposal is None or proposal.weights is None:
+        if self._exclusions is None or proposal is None or proposal.weights is None:
             return None
         solver, selection = self._selections, proposal.selection
         solved = None if self._fails(proposal) else solver.solve_equations(selection)
@@ -111,7 +135,7 @@ class ExactCertifier(WithoutProof):
             return None
         if any(moved[i] > 0 if selection[i] == OPEN else point[i] < 0 for i in proposal.sliding):
             return None
-        sign = only_solution(self._enclosed, proposal.named, proposal.free, proposal.weights, point, moved)
+        sign = only_solution(self._exclusions.system, proposal.named, proposal.free, proposal.weights, point, moved)
         if not sign:
             return None
         if not holds_below(codes, active):
@@ -124,8 +148,8 @@ class ExactCertifier(WithoutProof):
         return proposal, [solution]
 
     def _fails(self, proposal: Proposal) -> bool:
-        """Whether many digits show that the solution of what is proposed breaks a condition at a node that is free."""
-        found = self._precisely(proposal.selection)
+        """True if many digits show that the solution of a proposal breaks a condition at a node that is free."""
+        found = None if self._precisely is None else self._precisely(proposal.selection)
         if found is None:
             return False
         kinds = [(i, kind) for i, code in enumerate(proposal.selection) for kind in CONDITIONS[code].inequalities]
@@ -152,8 +176,14 @@ class ExactCertifier(WithoutProof):
         return None
 
     def excluded(self, codes: Codes, relaxation: Bound) -> bool:
-        """Whether the multipliers prove a positive lower bound on the energy."""
+        """True if the multipliers prove a positive lower bound on the energy."""
         solver = self._selections
+        if solver.modes:
+            if self._exclusions is None:
+                return False
+            found = self._exclusions.record(codes, relaxation, within=self.bounded)
+            self.bounded |= found is not None and found[1]
+            return found is not None
 
         def imposed(node: int) -> dict[int, int]:
             return imposed_rows(codes[node], friction=solver.F_positive[node])

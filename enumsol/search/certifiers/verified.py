@@ -6,35 +6,40 @@ problem is small enough, otherwise the selection is left undecided with the reas
 
 from __future__ import annotations
 
+from dataclasses import replace
+from functools import partial
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from enumsol.model.statuses import CONDITIONS, RowKind
 from enumsol.proof import leaves, records
-from enumsol.proof.proof_file import coarse, fraction_text
+from enumsol.proof.proof_file import fraction_text
 from enumsol.search.certifiers import protocol
-from enumsol.search.fathoming import Proposal, propose, without_load
+from enumsol.search.certifiers.exclusions import proven
+from enumsol.search.fathoming import propose, without_load
 from enumsol.search.reduction import NEAR
 from enumsol.selections.solution import SelectionSolution
-from enumsol.trusted.at_alpha import VerifiedSelection, holds_no_root, solve_selection
+from enumsol.trusted.at_alpha import VerifiedSelection, settled_selection, solve_selection
 from enumsol.trusted.exclusion import Terms
-from enumsol.trusted.status_rows import FREE, NONNEGATIVE, row_signs
-from enumsol.trusted.uniqueness import ClosedSolution, closed_solution, lone_root, same_solution
+from enumsol.trusted.joint_roots import JointRoot
+from enumsol.trusted.status_rows import CONDITIONS as ROWS, FREE, NONNEGATIVE, SLIP_MINUS, SLIP_PLUS, row_signs
+from enumsol.trusted.uniqueness import ClosedSolution, closed_solution, same_solution
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
 
     from enumsol.condensation.condensed import ScaledSystem
-    from enumsol.condensation.enclosure import EnclosedSystem
     from enumsol.proof.records import EnclosureRecord, Record
     from enumsol.proof.writer import Recorder
+    from enumsol.search.certifiers.exclusions import Exclusions
     from enumsol.search.certifiers.rational_certifier import ExactCertifier
-    from enumsol.search.fathoming import Point
     from enumsol.search.fathoming_in_contact import LoneProposal
+    from enumsol.search.reduction import Point, Proposal
+    from enumsol.search.reference_closer import OnlyRoot
     from enumsol.support.array_types import Codes, Floats, Indices
-    from enumsol.trusted.joint_roots import JointRoot
     from enumsol.trusted.quadratic_forms import EnclosedForm
+    from enumsol.trusted.reference import Reference
 
 
 _ROW_NAMES = {
@@ -45,19 +50,19 @@ _ROW_NAMES = {
     RowKind.SLIP_FORWARD: "the slip condition of node {}",
     RowKind.SLIP_BACKWARD: "the slip condition of node {}",
 }
-#: Rounding the multipliers hardly lowers bounds above this: for a wedge, 10 of 28,196 bounds are halved.
-_CLEAR = 1e-6
+#: How a node slips, or is about to, where one of these kinds of rows is zero.
+_SLIPS = {2: SLIP_PLUS, 5: SLIP_PLUS, 3: SLIP_MINUS, 6: SLIP_MINUS}
 
 
-class VerifiedCertifier(protocol.RecordingCertifier):
+class VerifiedCertifier(protocol.Certifier):
     """Proves prunings and complete selections, and writes the proof.
 
     Parameters
     ----------
     scaled : ScaledSystem
         The system that the search works on; it gives the units of the multipliers.
-    enclosed : EnclosedSystem or None
-        Balls for the same system; None sends everything to rationals.
+    exclusions : Exclusions or None
+        With balls for the same system; None sends everything to rationals.
     exact : callable giving an ExactCertifier, or None when the problem is too large for rationals
     recorder : Recorder
         Where the records of the proof go.
@@ -66,13 +71,13 @@ class VerifiedCertifier(protocol.RecordingCertifier):
         Asked where balls in double arithmetic do not decide.
     """
 
-    exactly, plain, lone = False, False, True
+    exactly, lone = False, True
     _escalations: protocol.Escalations
 
     def __init__(
         self,
         scaled: ScaledSystem,
-        enclosed: EnclosedSystem | None,
+        exclusions: Exclusions | None,
         exact: Callable[[], ExactCertifier | None],
         recorder: Recorder,
         node_ids: Sequence[Any],
@@ -81,38 +86,41 @@ class VerifiedCertifier(protocol.RecordingCertifier):
         super().__init__(recorder)
         self._precisely = precisely
         self._scaled = scaled
-        self._enclosed = enclosed
-        self._margin = None if enclosed is None else protocol.energy_margin(enclosed)
+        self._exclusions = exclusions
+        self._enclosed = None if exclusions is None else exclusions.system
         self._exact = exact
         self._node_ids = node_ids
         self._escalations = protocol.Escalations()
         self._form_margins: dict[EnclosedForm, protocol.Margin] = {}
-        #: A complete selection was not decided by balls.
-        self.hard = False
         #: Selections of the roots found in rationals.
         self._known: list[Codes] = []
 
     def excluded(self, codes: Codes, relaxation: protocol.Bound) -> bool:
         """True if the relaxation's multipliers are proven to exclude the partial assignment."""
-        rows, values = relaxation.multipliers()
         if relaxation.form is not None:
-            return self._excluded_by(relaxation.form, codes, rows, values)
-        if self._margin is not None:
-            if (kept := proven(self._margin, codes, rows, values)) is not None:
-                self._escalations.balls += 1
-                self._leaf(leaves.Excluded(rows, kept))
+            return self._excluded_by(relaxation.form, codes, *relaxation.multipliers())
+        if self._exclusions is not None:
+            if (found := self._exclusions.record(codes, relaxation, within=self.bounded)) is not None:
+                self._nothing(*found)
                 return True
         elif (certifier := self._exact()) is not None and certifier.excluded(codes, relaxation):
             # no balls for an S that is positive definite only within rounding
             self._escalations.rationals += 1
             # the certifier passes over multipliers that prove nothing, a checker refuses them
-            self._leaf(leaves.Excluded(*self._allowed(codes, rows, values), leaves.RATIONAL))
+            terms = self._allowed(codes, *relaxation.multipliers())
+            self._leaf(leaves.Excluded(*terms, leaves.RATIONAL))
             return True
         self._escalations.refined += 1
         return False
 
+    def _nothing(self, record: Record, bounded: bool = False) -> None:
+        """Write a leaf without a root."""
+        self.bounded |= bounded
+        self._escalations.balls += 1
+        self._leaf(record)
+
     def _excluded_by(self, form: EnclosedForm, codes: Codes, rows: Indices, values: Floats) -> bool:
-        """The same with a form in place of the energy."""
+        """True if multipliers exclude the assignment with a form in place of the energy."""
         margin = self._form_margins.get(form)
         if margin is None:
             margin = self._form_margins[form] = protocol.margin_of_form(form, protocol.FORM_ERRORS)
@@ -127,7 +135,7 @@ class VerifiedCertifier(protocol.RecordingCertifier):
         return True
 
     def _allowed(self, codes: Codes, rows: Indices, values: Floats) -> Terms:
-        """Those rows and multipliers that may prove something."""
+        """Rows and multipliers that may prove something."""
         kind, node = np.divmod(rows, self._scaled.p)
         signs = row_signs(np.array(codes), self._scaled.F)[node, kind]
         keep = (signs == FREE) | ((signs == NONNEGATIVE) & (values > 0))
@@ -135,30 +143,33 @@ class VerifiedCertifier(protocol.RecordingCertifier):
 
     def selection(self, codes: Codes) -> SelectionSolution | protocol.UndecidedPart | None:
         """All roots in a complete selection."""
-        ball = None if self._enclosed is None else solve_selection(self._enclosed, codes)
-        if self._enclosed is not None and not (ball is not None and ball.is_root):
-            if holds_no_root(self._enclosed, codes, ball):
-                self._escalations.balls += 1
-                self._leaf(leaves.NoRoot())
+        exclusions, ball = self._exclusions, None
+        if exclusions is not None:
+            if (unbalanced := exclusions.unbalanced(codes)) is not None:
+                self._nothing(unbalanced)
                 return None
-            ball = self._precisely(codes) or ball
-        if ball is not None and ball.is_root:
-            self._escalations.balls += 1
-            return self._regular(codes, ball)
-        if ball is not None and ball.is_excluded:
-            self._escalations.balls += 1
-            self._leaf(leaves.NoRoot())
-            return None
+            found = settled_selection(exclusions.system, codes, self._precisely)
+            if isinstance(found, VerifiedSelection):
+                self._escalations.balls += 1
+                return self._regular(codes, found)
+            if (none := exclusions.no_root(codes, none=found is None, within=self.bounded)) is not None:
+                self._nothing(*none)
+                return None
+            ball = None if found is None else found.near
         self.hard = True
         certifier = self._exact()
+        held = exclusions is None or exclusions.system.held
         if certifier is None:
-            if (found := self._closed_selection(codes, ball)) is not None:
-                return found[0] if found else None
+            if not held:
+                return self._shared(codes, ball) or self._open(codes, ball)
+            if (closed := self._closed_selection(codes, ball)) is not None:
+                return closed[0] if closed else None
             return self._open(codes, ball)
         solution = certifier.selection(codes)
+        self.bounded |= certifier.bounded
         if isinstance(solution, SelectionSolution):
             self._known.append(codes)
-            if ball is not None:
+            if ball is not None and held:
                 self._take_note(ball.force.mid, ball.w.mid)
         return self._in_rationals(codes, solution)
 
@@ -212,21 +223,20 @@ class VerifiedCertifier(protocol.RecordingCertifier):
         """The root of what is proposed, if it is proven to be the only one below a partial assignment; else None."""
         if self._enclosed is None:
             return None
-        terms = self._allowed(codes, *bound.multipliers())
-        given = proposal.selection, proposal.weights, proposal.strengths
-        root = lone_root(self._enclosed, codes, *given, *terms)
+        more = proposal.strengths, self._allowed(codes, *bound.multipliers())
+        leaf = leaves.Alone(proposal.selection, proposal.weights, records.NOWHERE, *more)
+        root = leaf.holds(self._enclosed, codes)
         if root is None:
             return None
         self._escalations.balls += 1
-        chosen, weights, strengths = given
-        return [self._regular(chosen, root, lambda ball: leaves.Alone(chosen, weights, ball, strengths, terms))]
+        return [self._regular(leaf.selection, root, lambda said: replace(leaf, enclosure=said))]
 
     def _take_note(self, force: Floats, w: Floats) -> None:
         """Take note of nodes that slide without load at a solution."""
         self.sliding |= without_load(self._scaled, force, w)
 
     def _closed_selection(self, codes: Codes, near: VerifiedSelection | None) -> list[SelectionSolution] | None:
-        """The same for a selection whose conditions are not decided, without rationals."""
+        """The solutions of a selection whose conditions are not decided, without rationals; None if not proven."""
         if near is None:
             return None
         point = near.force.mid, near.w.mid
@@ -264,7 +274,7 @@ class VerifiedCertifier(protocol.RecordingCertifier):
                 ball.core, (ball.force.mid,), 0, 0, strict=False, index=ball.index, possible=ball.possible
             )
         self._escalations.balls += 1
-        self._leaf(leaves.Closed(*record, self._ball(ball, ball.index)))
+        self._leaf(leaves.Closed(*record, self._ball(ball)))
         return [solution]
 
     def _regular_one(self, ball: ClosedSolution) -> SelectionSolution | None:
@@ -280,12 +290,6 @@ class VerifiedCertifier(protocol.RecordingCertifier):
         self._verified[codes] = regular
         return SelectionSolution(codes, (regular.force.mid,), 0, regular.index, strict=True)
 
-    def add(self, part: protocol.Certified) -> None:
-        """Take over what the certifier of a subtree has proven."""
-        super().add(part)
-        if part.escalations is not None:
-            self._escalations.add(part.escalations)
-
     def forget(self) -> None:
         """Forget what was proven."""
         super().forget()
@@ -297,7 +301,7 @@ class VerifiedCertifier(protocol.RecordingCertifier):
     ) -> SelectionSolution:
         """Write a leaf with a regular root, made of its enclosure."""
         self._verified[codes] = ball
-        self._leaf(leaf(self._ball(ball, ball.index)))
+        self._leaf(leaf(self._ball(ball)))
         return SelectionSolution(codes, (ball.force.mid,), 0, ball.index, strict=True)
 
     def _undecided(self, codes: Codes, reason: str, hint: str) -> protocol.UndecidedPart:
@@ -305,18 +309,51 @@ class VerifiedCertifier(protocol.RecordingCertifier):
         self._leaf(leaves.UndecidedRecord(reason))
         return protocol.UndecidedPart(codes, reason, hint, examined=True)
 
-    def _ball(self, found: VerifiedSelection | ClosedSolution | JointRoot, index: int | None) -> EnclosureRecord:
-        """Where a root is, in the problem's units."""
-        force = self._scaled.force
-        return records.EnclosureRecord(found.force.mid * force, found.force.rad * force * protocol.WIDEN, index)
+    def _ball(self, found: VerifiedSelection | ClosedSolution | JointRoot) -> EnclosureRecord:
+        """Enclosure of a root, in the problem's units."""
+        return records.EnclosureRecord.around(found.force, self._scaled.force, found.index, protocol.WIDEN)
 
+    # -- a body that nothing holds (theory, section 14) ----------------------------------------------------------------
 
-def proven(margin: protocol.Margin, codes: Codes, rows: Indices, values: Floats) -> Floats | None:
-    """Multipliers that exclude a partial assignment, rounded if these do it as well; None if those given do not."""
-    short = coarse(values)
-    if margin(codes, rows, short) > _CLEAR:
-        return short
-    return values if margin(codes, rows, values) > 0 else None
+    def reference(self, selection: Codes) -> Reference | None:
+        """The form of a root, if one is proven definite."""
+        return None if self._exclusions is None else self._exclusions.reference(selection)
+
+    def only_root(self, codes: Codes, reference: Reference, proposal: OnlyRoot) -> list[SelectionSolution] | None:
+        """The roots below an assignment, that of a form or none; None if that is not proven."""
+        exclusions = self._exclusions
+        within = self.bounded or self._exact() is None
+        needs = None if exclusions is None else exclusions.only_root(codes, reference, proposal, within=within)
+        if needs is None or exclusions is None:
+            return None
+        self.bounded |= needs
+        self._escalations.balls += 1
+        selection = reference.selection
+        back = self._back(selection, lambda: exclusions.declared[selection])
+        leaf = partial(leaves.OnlyReference, back, proposal.rows, proposal.products)
+        if reference.lies_below(codes):
+            return [self._regular(selection, reference.root, leaf)]
+        self._leaf(leaf())
+        return []
+
+    def _shared(self, codes: Codes, ball: VerifiedSelection | None) -> SelectionSolution | None:
+        """The root that a selection may share with others, some nodes being between stick and slip."""
+        shared = [known for known in self._verified.values() if isinstance(known, JointRoot)]
+        root = next((known for known in shared if known.has(codes)), None)
+        if root is None:
+            slips = None if ball is None else _between(codes, ball)
+            if not slips or self._enclosed is None:
+                return None
+            leaf = leaves.SharedRoot(tuple(sorted(slips.items())), records.NOWHERE)
+            core, root = leaf.core(codes), leaf.holds(self._enclosed, codes)
+            # one that is known has other nodes between stick and slip
+            if root is None or any(known.core == core for known in shared):
+                return None
+            self._verified[core] = root
+        self._escalations.balls += 1
+        self._leaf(leaves.SharedRoot(root.slips, self._ball(root)))
+        point, sign = (root.force.mid,), root.index
+        return SelectionSolution(root.core, point, 0, sign, strict=False, index=sign, possible=root.possible)
 
 
 def _only(codes: Codes) -> tuple[frozenset[int], ...]:
@@ -350,3 +387,15 @@ def _reason(codes: Codes, ball: VerifiedSelection | None, node_ids: Sequence[Any
         names += [f"what is left of max_rigid_displacement along mode {mode}"] * (len(slack) - len(names))
         hint = "take another max_rigid_displacement"
     return f"{names[k]} is zero to {slack[k] + ball.slack.rad[k]:.0e} (scaled)", hint
+
+
+def _between(codes: Codes, ball: VerifiedSelection) -> dict[int, int] | None:
+    """Nodes whose slip bound or slip is open, and how they slip or may slip; None if another condition is open."""
+    slips = {}
+    rows = [(kind, i) for i, code in enumerate(codes) for kind in ROWS[code][1]]
+    for number in np.flatnonzero(~(ball.slack.mid > ball.slack.rad)).tolist():
+        kind, node = rows[number] if number < len(rows) else (None, 0)
+        if kind not in _SLIPS:
+            return None
+        slips[node] = _SLIPS[kind]
+    return slips

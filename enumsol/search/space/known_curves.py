@@ -17,11 +17,12 @@ from enumsol.arithmetic.rationals import simplest
 from enumsol.model.sectors import DEEPEST, SECTORS, level_of, parts_around, places, span, width_of
 from enumsol.proof.curve_records import OnCurve, ThroughCurveBox
 from enumsol.proof.leaves import NoRoot
+from enumsol.search.space.curve_proposals import curve_point, placed, unplaced
 from enumsol.search.space.piece_multipliers import unbalanced
 from enumsol.search.space.space_fathoming import without_sectors
 from enumsol.trusted.space.curve_runs import KnownCurve
 from enumsol.trusted.space.pieces import lie_along
-from enumsol.trusted.space.solution_curve import AlphaProblem, curve_point
+from enumsol.trusted.space.solution_curve import AlphaProblem
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Sequence
@@ -35,9 +36,8 @@ if TYPE_CHECKING:
     from enumsol.support.array_types import Codes, Floats, Mask
     from enumsol.trusted.space.curve_chains import CurveChain
     from enumsol.trusted.space.curve_runs import CurveParts
-    from enumsol.trusted.space.leaf_arcs import LeafArc
     from enumsol.trusted.space.leaves import Open, SpaceRoot
-    from enumsol.trusted.space.pieces import AlphaPiece
+    from enumsol.trusted.space.pieces import AlphaPiece, LeafArc
     from enumsol.trusted.space.solution_curve import SolutionCurve
 
     Bounds = tuple[Fraction, Fraction]
@@ -169,7 +169,7 @@ class Curves:
         """True if a solution seems to lie on a known curve; no claim."""
         if not self._boxes:
             return False
-        return bool(np.any(self._around(self._given.placed(x), np.zeros_like(x))))
+        return bool(np.any(self._around(placed(self._given, x), np.zeros_like(x))))
 
     def _around(self, x: Floats, rad: Floats) -> Mask:
         """Which boxes seem to hold a point, and all that is within a radius of it along t; no claim."""
@@ -251,7 +251,7 @@ def points_on(arc: LeafArc, known: KnownCurve, parts: CurveParts, codes: Codes) 
 def _narrow(problem: AlphaProblem, x: Floats, codes: Codes, nodes: Sequence[int]) -> Codes:
     """A leaf of narrow sectors around a solution, (zeta, alpha)."""
     leaf, p = list(codes), len(codes)
-    y = (problem.unplaced(x)[:-1] / problem.ratio.mid)[p : 3 * p].reshape(2, p)
+    y = (unplaced(problem, x)[:-1] / problem.ratio.mid)[p : 3 * p].reshape(2, p)
     for i in nodes:
         # sectors of this level around the point, or narrower ones
         up = DEEPEST + 2 - max(12, level_of(codes[i] - SECTORS))

@@ -12,12 +12,13 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from enumsol.arithmetic.balls import nearly_singular
+from enumsol.search.space.curve_proposals import ERRORS
+from enumsol.search.space.product_search import box_around
 from enumsol.search.space.space_fathoming import NEAR, Point
 from enumsol.search.space.space_newton import Isotropic
-from enumsol.trusted.space.boxed_solution import BoxedSolution, box_around, is_inside, solution_in_box
+from enumsol.trusted.space.boxed_solution import BoxedSolution, is_inside, solution_in_box
 from enumsol.trusted.space.leaf_equations import with_free_bounds
 from enumsol.trusted.space.leaves import Open, settle
-from enumsol.trusted.space.solution_curve import ERRORS
 from enumsol.trusted.space.turning import turned_by
 
 if TYPE_CHECKING:

@@ -16,8 +16,7 @@ from enumsol.condensation.space_condensed import SpaceSystem
 from enumsol.model.statuses import UNDECIDED
 from enumsol.search.space.space_fathoming import DefiniteForm
 from enumsol.trusted.space.curve_runs import CurveParts, KnownCurve, Run
-from enumsol.trusted.space.piece_forms import PieceWeights, how_far_off
-from enumsol.trusted.space.space_uniqueness import equations
+from enumsol.trusted.space.space_uniqueness import PieceWeights, equations, how_far_off
 
 if TYPE_CHECKING:
     from collections.abc import Sequence

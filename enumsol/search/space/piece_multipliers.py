@@ -16,11 +16,11 @@ from scipy.optimize import nnls
 from enumsol.condensation.space_condensed import EnclosedSpace, SpaceSystem
 from enumsol.proof.leaves import Excluded, Unbalanced
 from enumsol.relaxation.space_relaxation import SpaceEngine
-from enumsol.search.floating_solvers import weakly_held
+from enumsol.search.setup import weakly_held
 from enumsol.search.space.space_newton import Isotropic
 from enumsol.search.space.space_search import SpaceSplitting
 from enumsol.search.splitting import ImposedRows
-from enumsol.trusted.confinement import motion_beside
+from enumsol.trusted.floating_bounds import motion_beside
 from enumsol.trusted.space.resultants import resultants
 from enumsol.trusted.space.sector_rows import FORCE, FREE, GAP, OF_DISCS, TAU, Row, row_sign, sector_row_terms
 

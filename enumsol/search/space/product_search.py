@@ -1,6 +1,7 @@
-"""In 3D: an assignment that holds one known solution, or none, by forms of products (theory, section 12.11).
+"""Boxes that may hold one solution in 3D, and assignments that hold a known one, or none, by forms of products.
 
-Nothing here is trusted: ``trusted.space.product_forms`` proves the ellipsoids that are proposed.
+See theory, sections 12.7 and 12.11. Nothing here is trusted: ``trusted.space.boxed_solution`` and
+``trusted.space.product_forms`` prove what is proposed.
 """
 
 from __future__ import annotations
@@ -14,24 +15,30 @@ import scipy.sparse
 
 from enumsol.model.sectors import DEEPEST, SECTORS, cut, level_of, width_of
 from enumsol.model.statuses import CONTACT, UNDECIDED
+from enumsol.search.space.curve_proposals import ERRORS
 from enumsol.support.conic import conic_answer
 from enumsol.support.deadlines import look, remaining
-from enumsol.trusted.space.boxed_solution import BoxedSolution, proposed_rho, solution_in_box
+from enumsol.trusted.space.boxed_solution import Box, BoxedSolution, BoxProblem, solution_in_box
 from enumsol.trusted.space.product_forms import CONE, SIGNED, Ellipsoid, Frame
 from enumsol.trusted.space.sector_rows import sector_children
+from enumsol.trusted.space.space_uniqueness import moderate_units
 
 if TYPE_CHECKING:
     from enumsol.condensation.space_condensed import EnclosedSpace
     from enumsol.support.array_types import Codes, Floats
 
 
-#: What a writer of proofs asks for (see ``Ellipsoid.of``).
-_ERRORS = 2.0
 #: The radius of the ellipsoid that a program is scaled for should be within this of the one that it finds.
 _SCALED, _RESCALINGS = 30.0, 2
 #: Rank of the forms up to which a program is begun: beyond, its preparation alone takes more than a second, in which
 #: Python hears nothing, and the program minutes.
 _HIGHEST = 72
+#: A box around an ellipsoid is wider than that by this factor.
+_ROOM = 1.01
+#: Size of the box that is tried first, by the forces that would hold one node alone, and how often it is halved.
+_FIRST, _HALVINGS = 1.0, 24
+#: Where rho is tried between compliance and stiffness, as an exponent of the latter.
+_SHARES = 0.5, 1.0
 #: Seconds that a program takes, by the sixth power of that rank (its matrix has rank^2 rows); measured: 0.13 for 28,
 #: 0.7 for 36, 2.7 for 44. One that would take all the time that is left is not begun.
 _SECONDS = 4e-10
@@ -123,12 +130,12 @@ class ProductSearch:
     def _boxed(self, ellipsoid: Ellipsoid) -> BoxedSolution | None:
         """The one solution in a box around an ellipsoid, if that is proven."""
         for known in self._boxes:
-            if ellipsoid.is_in(known.box, _ERRORS):
+            if ellipsoid.is_in(known.box, ERRORS):
                 return known
         for rho in self._rho:
-            box = ellipsoid.box(rho)
-            found = None if box is None else solution_in_box(self._system, box, _ERRORS)
-            if found is not None and ellipsoid.is_in(found.box, _ERRORS):
+            box = _box(ellipsoid, rho)
+            found = None if box is None else solution_in_box(self._system, box, ERRORS)
+            if found is not None and ellipsoid.is_in(found.box, ERRORS):
                 self._boxes.append(found)
                 return found
         return None
@@ -207,11 +214,21 @@ class ProductSearch:
                 break
             size *= float(root)
         centre = at + T @ u
-        ellipsoid = Ellipsoid.of(self._system, codes, centre, z, _ERRORS)
+        ellipsoid = Ellipsoid.of(self._system, codes, centre, z, ERRORS)
         if ellipsoid is None:
             return None
         self._near = centre
         return ellipsoid, size * float(np.sqrt(max(-least, 1e-2)))
+
+
+def _box(ellipsoid: Ellipsoid, rho: Floats) -> Box | None:
+    """A box that holds an ellipsoid, for boxes with such a rho."""
+    T, system = ellipsoid.T, ellipsoid.frame.system
+    with np.errstate(all="ignore"):
+        radius = np.linalg.norm(T + rho[:, None] * (system.S @ T), axis=1) * ellipsoid.reach * _ROOM
+    if ellipsoid.empty or not np.all(np.isfinite(radius)) or not np.all(radius > 0):
+        return None
+    return Box.of(system, ellipsoid.frame.centre, radius, rho)
 
 
 def _solved(matrices: Floats, kinds: list[int], size: float) -> tuple[Floats, Floats, float] | None:
@@ -275,3 +292,38 @@ def _packed(matrices: Floats) -> Floats:
     size = matrices.shape[-1]
     column, row = np.tril_indices(size)
     return np.where(row == column, 1.0, np.sqrt(2.0)) * matrices[..., row, column]
+
+
+def box_around(system: EnclosedSpace, y: Floats) -> Box | None:
+    """A box, as large as is found, that seems to hold one solution, near scaled forces y."""
+    if not moderate_units(system.unit) or not np.all(np.isfinite(y)):
+        return None
+    with np.errstate(all="ignore"):
+        for rho in proposed_rho(system):
+            problem = BoxProblem.of(system, rho)
+            centre = None if problem is None else problem.zero(y * system.unit)
+            if problem is None or centre is None:
+                continue
+            near = problem.around(centre)
+            radius = np.full(len(y), _FIRST * float(np.max(np.abs(problem.g.mid) / np.diagonal(problem.S.mid))))
+            for _ in range(_HALVINGS):
+                if near.mapped(radius, 2.0) is not None:
+                    return Box.of(system, centre / system.unit, radius / system.unit, rho)
+                radius *= 0.5
+    return None
+
+
+def proposed_rho(system: EnclosedSpace) -> list[Floats]:
+    """rho, one for lambda_n and one for tau of every node, scaled: between 1 / S_ii and the stiffness S^-1_ii."""
+    soft = system.unit**2 / np.diagonal(system.S)
+    try:
+        stiff = np.diagonal(np.linalg.inv(system.S)) * system.unit**2
+    except np.linalg.LinAlgError:
+        return []
+    found = []
+    for share in _SHARES:
+        rho = soft ** (1.0 - share) * stiff**share
+        for t in system.tau:
+            rho[t[t >= 0]] = np.min(rho[t[t >= 0]], initial=np.inf)
+        found.append(rho / system.unit**2)
+    return found

@@ -18,7 +18,7 @@ from enumsol.search.closing import TreeCloser
 from enumsol.search.space.product_search import ProductSearch
 from enumsol.search.space.space_newton import Isotropic
 from enumsol.support.deadlines import look
-from enumsol.trusted.space.space_uniqueness import LARGEST_UNIT, equations
+from enumsol.trusted.space.space_uniqueness import equations, moderate_units
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -33,21 +33,13 @@ if TYPE_CHECKING:
 NEAR = 1e-9
 #: Level of the sectors in which a regular solution is sought.
 _LEVEL = 20
-#: Assignments of final statuses that are met before forms of products are tried, and programs for one of them.
-_HARD, _PROGRAMS = 256, 8
-#: Assignments that pass before the next try, at most.
-_LONGEST = 4096
-#: Smallest eigenvalue of Q relative to S below which it counts as not definite, at which numbers are good enough, and
-#: below which plain numbers leave no hope of better ones.
-_DEFINITE, _GOOD, _HOPELESS = 1e-9, 1e-2, -4.0
+#: Assignments of final statuses that are met before forms of products are tried, which cost more than so many leaves;
+#: and that pass before the next try, at most.
+_HARD, _LONGEST = 256, 4096
+#: Smallest eigenvalue of Q relative to S for plain numbers below which there is no hope of better ones.
+_HOPELESS = -4.0
 #: Slack and smallest eigenvalue that fast arithmetic asks for.
 _CLEAR = 1e-6
-#: Contact nodes from which better numbers than the plain ones are sought; evaluations for that, in rounds of so many.
-_MANY, _EVALUATIONS, _ROUND = 8, 60, 20
-#: Of the gap of an open node, what may serve for its slip.
-_SHARED = 0.5
-#: Weight of the equations of an assignment, by the largest entry of S.
-_WEIGHT = 1024.0
 
 
 def without_sectors(codes: Codes) -> tuple[int, ...]:
@@ -70,7 +62,7 @@ class SpaceClosing(Protocol):
         normal : (p,) array, lambda_n near the solution
         """
 
-    def alone(self, codes: Codes, numbers: Floats, leaf: Codes) -> list[Any] | None:
+    def alone_in(self, codes: Codes, numbers: Floats, leaf: Codes) -> list[Any] | None:
         """The root of a leaf, as a list, if no other solution has the statuses of an assignment; None if not proven."""
 
     def fathom(self, codes: Codes, tree: Sequence[Branched | Missed | Enclosed]) -> list[Any]:
@@ -92,7 +84,7 @@ class SpaceCloser(TreeCloser):
         super().__init__()
         self._system, self._certifier, self._regular = system, certifier, regular
         #: Smallest eigenvalue of Q relative to S, and slack of a solution, that are asked for.
-        self._enough, self._least = (_CLEAR, _CLEAR) if regular else (_DEFINITE, NEAR)
+        self._enough, self._least = (_CLEAR, _CLEAR) if regular else (1e-9, NEAR)
         #: Assignments of statuses that were tried in vain.
         self._tried: set[Codes] = set()
         #: Assignments of final statuses that were met, and that pass before products are tried again.
@@ -137,7 +129,7 @@ class SpaceCloser(TreeCloser):
 
     def _by_products(self, codes: Codes) -> list[Any] | None:
         """Solutions that forms of products leave of an assignment, if these are in a few boxes with one each."""
-        tree = None if self._regular else self._products.closed(codes, _PROGRAMS)
+        tree = None if self._regular else self._products.closed(codes, programs=8)
         return None if tree is None else self._certifier.fathom(codes, tree)
 
     def _alone(self, codes: Codes) -> list[Any] | None:
@@ -152,10 +144,10 @@ class SpaceCloser(TreeCloser):
                 return None
             if not all(map(_allows, statuses, point.codes)):
                 return None
-            held = equations(self._certifier.enclosed, statuses, _WEIGHT).mid
+            held = equations(self._certifier.enclosed, statuses, 1024.0).mid  # times the largest entry of S
             numbers = point.numbers(self._enough, better=False, held=held)
             if numbers is not None:
-                found = self._certifier.alone(statuses, numbers, point.codes)
+                found = self._certifier.alone_in(statuses, numbers, point.codes)
         if found is None:
             self._tried.add(statuses)
         return found
@@ -171,7 +163,7 @@ class SpaceCloser(TreeCloser):
         if point is None or (self._regular and point.slack < _CLEAR):
             return None
         # a tree would not end at a degenerate solution: numbers are sought there whatever they cost
-        better = not self._regular and (system.p >= _MANY or point.slack <= NEAR)
+        better = not self._regular and (system.p >= 8 or point.slack <= NEAR)
         numbers = point.numbers(self._enough, better=better)
         if numbers is None:
             return None
@@ -183,7 +175,7 @@ class SpaceCloser(TreeCloser):
 
 def solved(system: SpaceSystem, near: Floats | None = None) -> tuple[Point, Floats] | None:
     """A solution in floats, and its forces (p, 3) in isotropic variables, near those of another one; or None."""
-    if np.max(np.maximum(system.unit, 1.0 / system.unit)) > LARGEST_UNIT:
+    if not moderate_units(system.unit):
         return None
     problem = Isotropic.of(system)
     y = problem.solution(near)
@@ -266,7 +258,8 @@ class Point:
         held : rows whose squares are added to Q
         """
         tau, opened, size = self.system.tau, self.gap > 0, np.linalg.norm(self.slip, axis=1)
-        need = 1.0 - _SHARED * self.gap / np.where(size > 0, size, 1.0)
+        # half of the gap of an open node may serve for its slip
+        need = 1.0 - 0.5 * self.gap / np.where(size > 0, size, 1.0)
         theta = np.where(opened[:, None], self.theta * np.maximum(need, 0.0)[:, None], self.theta)
         theta = np.where((tau >= 0) & ~self.wide[:, None], theta, 0.0)
         form = DefiniteForm(self.system, [theta], opened, self.wide.astype(np.float64), held=held)
@@ -365,7 +358,7 @@ class DefiniteForm:
         """Better numbers: those with the largest soft minimum of the eigenvalues of Q relative to S."""
         from scipy.optimize import Bounds, minimize  # seldom needed
 
-        x, left = np.concatenate([logs.ravel(), shares.ravel()]), _EVALUATIONS
+        x, left = np.concatenate([logs.ravel(), shares.ravel()]), 60
         least_x = np.full_like(x, -np.inf)
         least_x[: self._system.p][self._open] = 0.0
         bounds = Bounds(least_x, np.inf)
@@ -373,9 +366,9 @@ class DefiniteForm:
         columns = np.linalg.inv(np.linalg.cholesky(self._S)).T
         # the smallest eigenvalue counts more sharply in each round
         for hardness in 10.0, 20.0, 40.0:
-            if left <= 0 or least > _GOOD:
+            if left <= 0 or least > 1e-2:  # no evaluation left, or good enough
                 break
-            options = {"maxfun": min(_ROUND, left), "maxiter": _ROUND}
+            options = {"maxfun": min(20, left), "maxiter": 20}
             given = columns, hardness
             try:
                 found = minimize(self._value, x, given, method="L-BFGS-B", jac=True, bounds=bounds, options=options)

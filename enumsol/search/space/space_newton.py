@@ -14,12 +14,8 @@ if TYPE_CHECKING:
     from enumsol.support.array_types import Floats
 
 
-#: Steps of Newton's method, halvings of one, and steps that may pass without a merit half as large.
-_STEPS, _HALVINGS, _PATIENCE = 40, 7, 12
 #: Residual at which a point counts as a solution, relative to forces of size one.
 _SOLVED = 1e-10
-#: First step of the homotopy in the radius of the discs, the smallest one, and their number at most.
-_FIRST, _SMALLEST, _RADII = 0.25, 0.02, 24
 
 
 @dataclass(frozen=True)
@@ -88,15 +84,15 @@ class Isotropic:
 
     def _grown(self) -> Floats | None:
         y = self._newton(np.zeros_like(self.g), 0.0)
-        radius, step = 0.0, _FIRST
-        for _ in range(_RADII):
+        radius, step = 0.0, 0.25
+        for _ in range(24):
             if y is None or radius >= 1.0:
                 break
             further = min(radius + step, 1.0)
             found = self._newton(y, further)
             if found is None:
                 step *= 0.5
-                if step < _SMALLEST:
+                if step < 0.02:
                     return None
             else:
                 y, radius, step = found, further, 1.5 * step
@@ -106,11 +102,11 @@ class Isotropic:
         """A solution for discs |tau| <= radius lambda_n from a point near it, (3 p,)."""
         H, J = self._natural(y, radius)
         size, best, waited = self._merit(H), np.inf, 0
-        for _ in range(_STEPS):
+        for _ in range(40):
             if size <= _SOLVED:
                 return y
             best, waited = (size, 0) if size < 0.5 * best else (best, waited + 1)
-            if waited > _PATIENCE:
+            if waited > 12:  # so many steps without a merit half as large
                 return None
             look()
             try:
@@ -121,7 +117,7 @@ class Isotropic:
             if not np.all(np.isfinite(step)):
                 return None
             share = 1.0
-            for _ in range(_HALVINGS):
+            for _ in range(7):
                 trial = y - share * step
                 found = self._natural(trial, radius)
                 if self._merit(found[0]) < size:

@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     from enumsol.support.array_types import Codes, Floats
     from enumsol.trusted.space.leaves import SpaceRoot
     from enumsol.trusted.space.sector_rows import Row
-    from enumsol.trusted.space.space_reference import SpaceProduct, SpaceReference
+    from enumsol.trusted.space.space_uniqueness import LeafReference
 
 #: Eigenvalues of the small matrix, relative to its largest one, that count as none; what of rows counts as none.
 _NONE, _NOTHING = 1e-9, 1e-8
@@ -46,8 +46,8 @@ def space_closer(certifier: Any, engine: SpaceEngine, root: Callable[[], Codes |
     root : callable giving the codes of a leaf with a strict root, or None
     """
 
-    def worth(found: SpaceReference) -> bool:
-        if not found.is_only_root(found.leaf, *proposed(found, found.leaf), found.system.reach):
+    def worth(found: LeafReference) -> bool:
+        if not found.is_only_root(found.selection, *proposed(found, found.selection), found.system.reach):
             return False
         engine.first = _far_apart(found)
         return True
@@ -60,10 +60,10 @@ def space_closer(certifier: Any, engine: SpaceEngine, root: Callable[[], Codes |
     return ReferenceCloser(certifier, root, proposed, worth=worth, pause=pause, easy=easy)
 
 
-def _far_apart(reference: SpaceReference) -> list[int]:
+def _far_apart(reference: LeafReference) -> list[int]:
     """Contact nodes, one more than it takes to hold the body against the foundation, far from each other."""
-    normals = reference.system.rows.G.mid[:, : len(reference.leaf)].T
-    pressed, found = [i for i, code in enumerate(reference.leaf) if code != OPEN], list[int]()
+    normals = reference.system.rows.G.mid[:, : len(reference.selection)].T
+    pressed, found = [i for i, code in enumerate(reference.selection) if code != OPEN], list[int]()
     # their squares would be singular otherwise
     M = 1e-3 * np.eye(normals.shape[1])
     for _ in range(min(int(np.linalg.matrix_rank(normals[pressed])) + 1, len(pressed))):
@@ -74,7 +74,7 @@ def _far_apart(reference: SpaceReference) -> list[int]:
     return found
 
 
-def proposed(reference: SpaceReference, codes: Codes) -> OnlyRoot:
+def proposed(reference: LeafReference, codes: Codes) -> OnlyRoot:
     """All equations of an assignment, and products of rows of its sectors where they are needed."""
     kinds = [(GAP, 0), (SLIP, 0), (SLIP, 1)]
     has = reference.system.tau >= 0
@@ -100,7 +100,7 @@ def proposed(reference: SpaceReference, codes: Codes) -> OnlyRoot:
     return OnlyRoot(rows, _products(reference, rows, chosen, factors[used]))
 
 
-def _tight(reference: SpaceReference, codes: Codes) -> list[Row]:
+def _tight(reference: LeafReference, codes: Codes) -> list[Row]:
     """Rows of the slips of an assignment that are nonnegative below it and not positive at the root."""
     rows = [(kind, i, code - SECTORS) for i, code in enumerate(codes) if code > SECTORS for kind in (LEFT, RIGHT)]
     signs = {SLIP_PLUS: 1, SLIP_MINUS: -1}
@@ -122,7 +122,7 @@ def _balanced(R: Floats) -> Floats | None:
     return y / np.linalg.norm(used, 2) if np.linalg.matrix_rank(used, tol=_NOTHING) == R.shape[1] else None
 
 
-def _products(reference: SpaceReference, rows: list[Row], tight: list[Row], y: Floats) -> list[SpaceProduct]:
+def _products(reference: LeafReference, rows: list[Row], tight: list[Row], y: Floats) -> list[tuple[Row, Row, float]]:
     """The products of tight rows with the factors z y_k y_l, z being best; none where it does not help."""
     coefficients = reference.rows(tight)
     y = y / np.linalg.norm(coefficients.mid, axis=1)
@@ -139,7 +139,7 @@ def _products(reference: SpaceReference, rows: list[Row], tight: list[Row], y: F
 def reference_numbers(
     system: SpaceSystem, enclosed: EnclosedSpace, root: SpaceRoot, leaf: Codes
 ) -> Iterator[tuple[Floats, float, float]]:
-    """Numbers, balance and share of forms that may be definite, as ``SpaceReference.of`` takes them."""
+    """Numbers, balance and share of forms that may be definite, as ``LeafReference.of`` takes them."""
     tau, p, unit = enclosed.tau, len(enclosed.tau), enclosed.unit
     y, w, code = root.y.mid, root.w.mid, np.array(leaf)
     force, slip = (np.where(tau >= 0, part, 0.0) for part in (y[tau] * unit[tau], w[tau] / unit[tau]))

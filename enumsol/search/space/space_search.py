@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -21,45 +22,45 @@ from enumsol.model.sectors import (
     span,
 )
 from enumsol.model.statuses import CONTACT, SLIP_MINUS, SLIP_PLUS, STICK, UNDECIDED
-from enumsol.proof.leaves import Alone, BoxedRoot, Excluded, NoRoot, RegularRoot, UndecidedRecord
-from enumsol.proof.records import DeclaredForm, EnclosureRecord
+from enumsol.proof.leaves import (
+    Alone,
+    BoxedRoot,
+    Excluded,
+    NoRoot,
+    OnlyReference,
+    RegularRoot,
+    Unbalanced,
+    UndecidedRecord,
+)
+from enumsol.proof.records import NOWHERE, DeclaredForm, EnclosureRecord
 from enumsol.relaxation.engine import PRUNE_MARGIN, Relaxation
 from enumsol.relaxation.space_relaxation import SpaceEngine, SpaceRelaxation
-from enumsol.search.certifiers.protocol import (
-    WIDEN,
-    Bound,
-    RecordingCertifier,
-    Refine,
-    UndecidedPart,
-)
+from enumsol.search.certifiers.protocol import WIDEN, Bound, Certifier, Refine, UndecidedPart
 from enumsol.search.outcome import HOLD
 from enumsol.search.space.open_leaves import Cause, KnownBoxes, obstacle, sector_to_halve
 from enumsol.search.space.product_search import Branched, Enclosed, Missed
+from enumsol.trusted.floating_bounds import motion_beside
 from enumsol.trusted.space.leaves import Open, SpaceRoot, settle
 from enumsol.trusted.space.product_forms import Ellipsoid, refines
-from enumsol.trusted.space.sector_rows import is_sector_covering, sector_margin
-from enumsol.trusted.space.space_uniqueness import OnlySolution, lone_root, only_root, only_solution_in_space
+from enumsol.trusted.space.resultants import resultants, unbounded
+from enumsol.trusted.space.sector_rows import is_sector_covering
+from enumsol.trusted.space.space_uniqueness import LeafReference, OnlySolution
 from enumsol.trusted.space.turning import turned_by
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Sequence
 
-    from enumsol.condensation.space_condensed import EnclosedSpace
+    from enumsol.condensation.space_condensed import EnclosedSpace, SpaceSystem
     from enumsol.proof.writer import Recorder
+    from enumsol.search.reference_closer import OnlyRoot
     from enumsol.support.array_types import Codes, Floats
     from enumsol.trusted.space.boxed_solution import BoxedSolution
     from enumsol.trusted.space.sector_rows import Row
     from enumsol.trusted.space.space_uniqueness import LooseSolution
 
 
-#: Forces that are known no better than this, relative to the largest one, are left to the tree.
-_PLACED = 1e-3
-#: Where all are smaller than this (scaled), relative to this.
-_SMALL_FORCE = 1e-6
 #: Enclosures of solutions in boxes are made in steps of four.
 _WIDER = 4.0 * WIDEN
-#: Roots are enclosed from two sectors of this level around their directions.
-_LEVEL = 17
 _PERTURB, _HOLD = "perturb the load, by 1e-4 of its largest entry, say", "hold the body by stiffer springs"
 
 
@@ -121,7 +122,71 @@ def _towards(code: int, vector: np.ndarray) -> float:
     return float(middle @ vector / np.linalg.norm(middle))
 
 
-class SpaceCertifier(RecordingCertifier):
+class SpaceExclusions:
+    """Exclusions of assignments; of a body that nothing holds if possible without a bound of its rigid displacement.
+
+    Parameters
+    ----------
+    enclosed : EnclosedSpace
+
+    Attributes
+    ----------
+    system, free : EnclosedSpace
+        With its bound, and with one beyond which there are no solutions; the same of a body that is held.
+    """
+
+    def __init__(self, enclosed: EnclosedSpace) -> None:
+        self.system, self.free = enclosed, enclosed if enclosed.held else unbounded(enclosed)
+        self._references: dict[Codes, LeafReference | None] = {}
+        #: How the forms of roots are declared, but for enclosures, by their leaves.
+        self.numbers: dict[Codes, tuple[Floats, Floats]] = {}
+
+    def reference(self, system: SpaceSystem, leaf: Codes) -> LeafReference | None:
+        """The form of the root of a leaf, if one is proven definite."""
+        from enumsol.search.space.space_references import reference_numbers  # of bodies that nothing holds only
+
+        if leaf not in self._references:
+            self._references[leaf], root = None, settle(self.system, leaf)
+            with np.errstate(all="ignore"):
+                tried = reference_numbers(system, self.system, root, leaf) if isinstance(root, SpaceRoot) else ()
+                for numbers, *more in tried:
+                    found = LeafReference.of(self.system, leaf, numbers, *more)
+                    if found is not None:
+                        self.numbers[leaf], self._references[leaf] = (numbers, np.array(more)), found
+                        break
+        return self._references[leaf]
+
+    def record(
+        self, codes: Codes, rows: list[Row], values: Floats, *, within: bool
+    ) -> tuple[Excluded | Unbalanced | NoRoot, bool] | None:
+        """A record that excludes a partial assignment, and whether it needs the bound; or None.
+
+        ``within``: the bound is known to be needed. Otherwise it is used only where all statuses are determined
+        (theory, section 14.4).
+        """
+        excluded = Excluded(rows, values)
+        if len(rows) and excluded.holds(self.free, codes, 2.0):
+            return excluded, False
+        if self.system.held:
+            return None
+        if (unbalanced := self.unbalanced(codes)) is not None:
+            return unbalanced, False
+        told = not any(code in (UNDECIDED, CONTACT) for code in codes)
+        if (within or told) and len(rows) and excluded.holds(self.system, codes, 2.0):
+            if told and settle(self.free, codes) is None:
+                return NoRoot(), False
+            return excluded, True
+        return None
+
+    def unbalanced(self, codes: Codes) -> Unbalanced | None:
+        """A record that no forces below a partial assignment are in balance with the load; or None."""
+        if self.system.held:
+            return None
+        record = Unbalanced(motion_beside(self.system, resultants(self.system, codes)))
+        return record if record.holds(self.system, codes) else None
+
+
+class SpaceCertifier(Certifier):
     """Proves prunings and leaves with the trusted core, and writes the proof.
 
     Parameters
@@ -130,11 +195,20 @@ class SpaceCertifier(RecordingCertifier):
     enclosed : EnclosedSpace
         Balls for its system; without radii in fast arithmetic.
     recorder : Recorder
+    exclusions : SpaceExclusions, optional
+        By these balls, where they are known already.
     """
 
-    def __init__(self, engine: SpaceEngine, enclosed: EnclosedSpace, recorder: Recorder) -> None:
+    def __init__(
+        self,
+        engine: SpaceEngine,
+        enclosed: EnclosedSpace,
+        recorder: Recorder,
+        exclusions: SpaceExclusions | None = None,
+    ) -> None:
         super().__init__(recorder)
         self._engine, self.enclosed = engine, enclosed
+        self._exclusions = exclusions or SpaceExclusions(enclosed)
         self._boxes = KnownBoxes(engine.system, enclosed)
 
     def excluded(self, codes: Codes, relaxation: Bound) -> bool:
@@ -144,11 +218,17 @@ class SpaceCertifier(RecordingCertifier):
         if isinstance(relaxation.form, Ellipsoid):
             return self._missed(codes, relaxation.form)
         rows, values = self._multipliers(relaxation)
-        form = relaxation.form
-        if not sector_margin(self.enclosed, codes, rows, values, 2.0, form) > 0:
+        if (form := relaxation.form) is None:
+            found = self._exclusions.record(codes, rows, values, within=self.bounded)
+            if found is not None:
+                self.bounded |= found[1]
+                self._leaf(found[0])
+            return found is not None
+        leaf = Excluded(rows, values)
+        if not leaf.holds(form, codes, 2.0):
             return False
-        by = None if form is None else self._back(form, lambda: DeclaredForm(self._whole, form.numbers, np.zeros(0)))
-        self._leaf(Excluded(rows, values, by))
+        by = self._back(form, lambda: DeclaredForm(self._whole, form.numbers, np.zeros(0)))
+        self._leaf(replace(leaf, by=by))
         return True
 
     def _multipliers(self, bound: Bound) -> tuple[list[Row], Floats]:
@@ -164,12 +244,24 @@ class SpaceCertifier(RecordingCertifier):
 
     def selection(self, codes: Codes) -> SpaceRoot | BoxedSolution | UndecidedPart | Refine | None:
         """The root of a leaf, a sector to halve, or why the leaf stays open."""
+        if (unbalanced := self._exclusions.unbalanced(codes)) is not None:
+            self._leaf(unbalanced)
+            return None
+        answer = self._settled(codes)
+        if not self.enclosed.held and (answer is None or isinstance(answer, SpaceRoot)):
+            self.bounded |= not isinstance(settle(self._exclusions.free, codes), type(answer))
+        return answer
+
+    def _settled(self, codes: Codes) -> SpaceRoot | BoxedSolution | UndecidedPart | Refine | None:
+        """The answer for a leaf, which is written."""
         answer = settle(self.enclosed, codes)
         if answer is None:
             self._leaf(NoRoot())
         elif isinstance(answer, Open):
             node = sector_to_halve(answer)
-            if (boxed := self._boxed(answer, halved=node is not None)) is not None:
+            # boxes rest on a stiffness that is positive definite
+            boxed = self._boxes.holding(answer, halved=node is not None) if self.enclosed.held else None
+            if boxed is not None:
                 return self._in_box(codes, boxed)
             if node is not None and level_of(codes[node] - SECTORS) < DEEPEST:
                 return Refine(node)
@@ -226,16 +318,12 @@ class SpaceCertifier(RecordingCertifier):
                 self._leaf(Excluded([], np.zeros(0), by))
         return found
 
-    def _boxed(self, leaf: Open, *, halved: bool) -> BoxedSolution | None:
-        """The one solution that an open leaf can have, which is ``halved`` otherwise, if that is proven."""
-        return self._boxes.holding(leaf, halved=halved)
-
     def _placed(self, codes: Codes, root: SpaceRoot) -> SpaceRoot:
         """The same root from sectors around it: its numbers then do not depend on how the search came to its leaf."""
         there = list(codes)
         turning = [i for i, code in enumerate(codes) if code > SECTORS]
         for i, (x, y) in zip(turning, turned_by(root.centre, root.angle)[0].tolist(), strict=True):
-            number = nearest(x, y, _LEVEL) - 1
+            number = nearest(x, y, 17) - 1  # of two sectors of this level around the direction
             if not is_sector(number + RUN):  # next to the end of a quarter
                 return root
             there[i] = SECTORS + number + RUN
@@ -253,20 +341,19 @@ class SpaceCertifier(RecordingCertifier):
         normal : (p,) array, lambda_n near the solution
         """
         found: SpaceRoot | OnlySolution | None
+        record = Alone(codes or (), numbers, NOWHERE)
         try:
-            if codes is None:
-                found = only_solution_in_space(self.enclosed, numbers, normal, errors=2.0)
-            else:
-                found = only_root(self.enclosed, numbers, codes, errors=2.0)
+            found = record.holds(self.enclosed, self._whole, errors=2.0, near=normal)
         except NotEnclosedError:
             return None
-        if found is None or not np.max(found.y.rad) <= _PLACED * np.max(np.abs(found.y.mid), initial=_SMALL_FORCE):
+        # forces that are known no better, relative to the largest one, are left to the tree
+        if found is None or not np.max(found.y.rad) <= 1e-3 * np.max(np.abs(found.y.mid), initial=1e-6):
             return None
         self._verified[codes or (UNDECIDED,) * len(normal)] = found
-        self._leaf(Alone(codes or (), numbers, self._ball(found)))
+        self._leaf(replace(record, enclosure=self._ball(found)))
         return [found]
 
-    def alone(self, codes: Codes, numbers: Floats, leaf: Codes) -> list[SpaceRoot] | None:
+    def alone_in(self, codes: Codes, numbers: Floats, leaf: Codes) -> list[SpaceRoot] | None:
         """The root of a leaf, if no other solution has the statuses of an assignment, and that record written; or None.
 
         Parameters
@@ -275,14 +362,34 @@ class SpaceCertifier(RecordingCertifier):
         numbers : of the form, as for ``close``
         leaf : codes of the leaf
         """
-        found = lone_root(self.enclosed, codes, numbers, leaf, errors=2.0)
+        record = Alone(leaf, numbers, NOWHERE)
+        found = record.holds(self.enclosed, codes, errors=2.0)
         if found is None:
             return None
-        self._leaf(Alone(leaf, numbers, self._ball(found)))
+        self._leaf(replace(record, enclosure=self._ball(found)))
         found = self._verified[leaf] = self._placed(leaf, found)
         return [found]
 
+    def reference(self, leaf: Codes) -> LeafReference | None:
+        """The form of the root of a leaf, if one is proven definite."""
+        return self._exclusions.reference(self._engine.system, leaf)
+
+    def only_root(self, codes: Codes, reference: LeafReference, proposal: OnlyRoot) -> list[SpaceRoot] | None:
+        """The root, as a list, unless it was declared before; None if it is not proven that no other one lies below."""
+        exclusions, leaf, found = self._exclusions, reference.selection, list[SpaceRoot]()
+        record = OnlyReference(0, *proposal)
+        if not record.holds(reference, codes, exclusions.free.reach):
+            if not record.holds(reference, codes, exclusions.system.reach):
+                return None
+            self.bounded = True
+        if leaf not in self._declared:
+            self.bounded |= not isinstance(settle(exclusions.free, leaf), SpaceRoot)
+            found = [self._placed(leaf, reference.root)]
+            self._verified[leaf] = found[0]
+        declared = DeclaredForm(leaf, *exclusions.numbers[leaf], self._ball(reference.root))
+        self._leaf(replace(record, back=self._back(leaf, lambda: declared)))
+        return found
+
     def _ball(self, found: SpaceRoot | LooseSolution, wider: float = WIDEN) -> EnclosureRecord:
         """Ball of a root, in the problem's units."""
-        unit = self.enclosed.unit
-        return EnclosureRecord(found.y.mid * unit, wider * found.y.rad * unit, found.index)
+        return EnclosureRecord.around(found.y, self.enclosed.unit, found.index, wider)

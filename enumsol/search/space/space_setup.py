@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import copy
+from dataclasses import replace
 from fractions import Fraction
 from functools import cached_property, partial
 from typing import TYPE_CHECKING, cast
@@ -20,21 +21,21 @@ from enumsol.search.certifiers.protocol import Certifier, Unrecorded
 from enumsol.search.closing import TreeCloser
 from enumsol.search.form_policy import Forms
 from enumsol.search.resume import Reader
-from enumsol.search.setup import SearchSetup
+from enumsol.search.setup import WEAK, SearchSetup, weakly_held
 from enumsol.search.space.space_fathoming import SpaceCloser, SpaceClosing, solved
-from enumsol.search.space.space_search import SpaceCertifier, SpaceSplitting
+from enumsol.search.space.space_search import SpaceCertifier, SpaceExclusions, SpaceSplitting
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
     from enumsol.model.problem3d import ContactProblem3D
     from enumsol.support.array_types import Alpha, Codes, Floats
-    from enumsol.trusted.space.slip_forms import SlipForm
+    from enumsol.trusted.space.sector_margins import SlipForm
 
+#: A form is used where it leaves no more than this share of the gap to the pruning bound at the root of the tree.
+_SHARE = 0.25
 #: Nodes examined with the energy before a form that knows where the body slides is tried (theory, section 12.2).
 NODES = 256
-#: It is used where it leaves no more than this share of the gap to the pruning bound at the root of the tree.
-_SHARE = 0.25
 
 
 class SpaceSolvers(SearchSetup):
@@ -91,11 +92,27 @@ class SpaceSolvers(SearchSetup):
         """Why verified arithmetic cannot prove anything about this problem, or None."""
         return self._enclosed[1]
 
+    @cached_property
+    def relaxed(self) -> SpaceSystem:
+        """The system that the relaxations are about: a body that nothing holds is on weak springs (section 14.5)."""
+        return self._on_springs(WEAK)
+
+    def _on_springs(self, stiffness: float) -> SpaceSystem:
+        if self.problem.held or self.enclosed.held:
+            return self.system
+        S, g = weakly_held(self.system.S, self.system.g, self.enclosed.rows, stiffness)
+        return replace(self.system, S=S, g=g)
+
+    @cached_property
+    def _exclusions(self) -> SpaceExclusions:
+        """Proofs that assignments have no solution."""
+        return SpaceExclusions(self.enclosed)
+
     def certifier(self, recorder: Recorder | None) -> SpaceCertifier:
         """The certifier of this arithmetic."""
         if recorder is None or self.arithmetic == "fast":
             recorder = Unrecorded()
-        return SpaceCertifier(self._engine, self.enclosed, recorder)
+        return SpaceCertifier(self._engine, self.enclosed, recorder, self._exclusions)
 
     def _solved(self, system: SpaceSystem, near: Floats | None) -> tuple[list[Codes], Floats] | None:
         with np.errstate(all="ignore"):
@@ -108,6 +125,10 @@ class SpaceSolvers(SearchSetup):
         return SpaceSplitting(self._engine)
 
     def _closer(self, certifier: Certifier) -> TreeCloser | None:
+        if not self.problem.held:
+            from enumsol.search.space.space_references import space_closer  # for such bodies only
+
+            return None if self.enclosed.held else space_closer(certifier, self._engine, lambda: self.known_root)
         return SpaceCloser(self.system, cast("SpaceClosing", certifier), regular=self.arithmetic == "fast")
 
     @property

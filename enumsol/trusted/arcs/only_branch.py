@@ -101,7 +101,9 @@ class _Along:
             return False
         kept = np.concatenate([np.arange(p), p + np.flatnonzero(self._rubbing)])
         S, here = self._system.S, np.ix_(kept, kept)
-        forms, taken = [numbers.form(S, theta)[here] for theta in slopes[:2]], numbers.taken(S, slopes[2])[here]
+        ends, off = [numbers.multipliers(theta) for theta in slopes[:2]], slopes[2]
+        lost = np.where(off > 0, numbers.kappa * off * ends[0].slip_sizes(S) * SAFE + TINY, 0.0)
+        forms, taken = [end.form(S)[here] for end in ends], ends[0].taken(S, off, lost)[here]
         self.hopeless = not all(definite(form, margin) for form in forms)
         return not self.hopeless and all(definite(form - taken, margin) for form in forms)
 
@@ -193,7 +195,7 @@ def _between(polynomials: Ball, ends: tuple[float, float]) -> tuple[Floats, Floa
 
 
 def _values(coefficients: Floats, tau: float) -> Floats:
-    """Polynomials at one tau; no claim rests on them."""
+    """About the values of polynomials at one tau; how far theta is off is bounded."""
     return np.asarray(coefficients @ tau ** np.arange(coefficients.shape[1]))
 
 

@@ -382,7 +382,7 @@ class _Stack:
         )
 
     def _guess(self, z: Floats, Q: Floats) -> tuple[Floats, list[Floats]]:
-        """The series of z, z_k = -Q z_(k-1), and powers Q, Q^2, Q^4, ...; no claim rests on its accuracy."""
+        """About the series of z, z_k = -Q z_(k-1), whose residual is bounded, and powers Q, Q^2, Q^4, ..."""
         Z, powers = np.concatenate([z, -Q @ z], axis=2), [Q]
         while Z.shape[2] < self._terms:
             last = powers[-1]

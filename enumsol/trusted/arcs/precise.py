@@ -17,16 +17,7 @@ from flint import arb, arb_mat
 
 from enumsol.arithmetic.balls import SAFE, Ball, upper_sum
 from enumsol.arithmetic.rationals import as_objects
-from enumsol.trusted.arcs.many_digits import (
-    ball_of,
-    column,
-    matrix,
-    precision,
-    products,
-    refined_table,
-    upper,
-    uppers,
-)
+from enumsol.trusted.arcs.many_digits import ball_of, column, matrix, precision, products, refined_table, upper, uppers
 from enumsol.trusted.arcs.taylor import AlphaFunctions
 from enumsol.trusted.selection import Selection
 

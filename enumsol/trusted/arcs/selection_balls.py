@@ -10,8 +10,7 @@ import numpy as np
 
 from enumsol.arithmetic.balls import SAFE, TINY, Ball, solution
 from enumsol.condensation.enclosure import CondensedEnclosure, EnclosedSystem, NotEnclosedError, RigidRows
-from enumsol.trusted.confinement import motion_against
-from enumsol.trusted.floating_bounds import is_unbalanced
+from enumsol.trusted.floating_bounds import is_unbalanced, motion_against
 from enumsol.trusted.selection import Selection
 
 if TYPE_CHECKING:

@@ -6,6 +6,7 @@ Which way alpha goes, where it turns back, and where a node changes its status.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from functools import cached_property
 
 import numpy as np
@@ -14,7 +15,7 @@ from enumsol.arithmetic.balls import SAFE, TINY, UNIT, Ball, solution, upper_nor
 from enumsol.support.array_types import Floats
 from enumsol.trusted.space.natural_map import Directions, upper_product
 from enumsol.trusted.space.sector_rows import FRICTIONLESS, OPEN, STICK
-from enumsol.trusted.space.solution_curve import SLIP, AlphaProblem, SolutionCurve
+from enumsol.trusted.space.solution_curve import SLIP, AlphaProblem, SolutionCurve, map_around
 
 #: Pairs of statuses between which one condition decides: the sign of |z_t| - F z_n, or of z_n.
 _BY_FRICTION = frozenset({STICK, SLIP})
@@ -38,12 +39,11 @@ class CurveMotion:
 
     def __init__(self, problem: AlphaProblem, curve: SolutionCurve, border: Floats | None = None) -> None:
         self.problem = problem
-        unit, box = np.append(problem.force, 1.0), curve.box
-        self._border, steps = (box.border if border is None else border) * unit, np.ones(problem.m)
-        self._Z = problem.moves(steps)
-        centre, spread = Ball.exact(box.centre / unit), curve.spread / unit
-        along, side = (self._Z @ Ball.exact(box.direction / unit)[:, None])[:, 0], upper_product(self._Z.size, spread)
-        z = Ball.joined(problem.arguments(centre, problem.forces_at(centre), steps), centre[-1:])
+        unit, box = problem.unit, curve.box
+        self._border = (box.border if border is None else border) * unit
+        near = map_around(problem, replace(box, rho=np.ones(problem.m)))
+        self._Z, z, along = near.moves, near.z, near.zd
+        side = upper_product(self._Z.size, curve.spread / unit)
         #: (z, alpha) at all points of the curve.
         self.z = Ball(z.mid, (z.rad + along.size * box.half + side) * SAFE + TINY)
         self._past = problem.past(z, along, box.half, side * SAFE)

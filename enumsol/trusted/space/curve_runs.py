@@ -99,9 +99,13 @@ class CurveParts:
 
     @cached_property
     def slips(self) -> tuple[Ball, Ball]:
-        """w_n and q w_t where a node is open, (N, p) and (N, p, 2), in the same unit: there z is rho w."""
+        """w_n and q w_t where a node is open, (N, p) and (N, p, 2), in the same unit: there z is rho w.
+
+        Without bounds where rho, a product of two numbers of a proof, may have over- or underflowed.
+        """
         p, inverse = len(self.rubs), 1.0 / self.rho
-        w = self.z * Ball(inverse, 4 * UNIT * inverse)
+        known = (self.rho > TINY) & (self.rho < 1.0 / TINY)
+        w = self.z * Ball(inverse, np.where(known, 4 * UNIT * inverse, np.inf))
         return w[:, :p], self._tangents(w)
 
     @cached_property
@@ -185,13 +189,13 @@ class KnownCurve:
         found = []
         with np.errstate(all="ignore"):
             for link in self.chain.links:
-                near, (radius, _, _) = link.curve.found.near, link.curve.found.spread
+                curve, near, radius = link.curve, link.curve.found.near, link.curve.found.spread[0]
                 begin, end = (float(link.start.mid - link.start.rad * SAFE), float(link.end.mid + link.end.rad * SAFE))
                 t = 0.5 * (begin + end), 0.5 * (end - begin) * SAFE + 4 * UNIT * (abs(begin) + abs(end))
-                m, wide = len(near.c) - 1, upper_product(near.Z.size, radius) * SAFE
-                along = near.zd[:m]
-                numbers = near.z.mid[:m], near.z.rad[:m], along.mid, along.rad, wide[:m], self.problem.rho * near.rho
-                found.append((*t, near.c[m], near.d[m], radius[m], *numbers))
+                m, wide = self.problem.m, upper_product(near.moves.size, radius) * SAFE
+                z, along, rho = near.z[:m], near.zd[:m], self.problem.rho * curve.box.rho
+                numbers = z.mid, z.rad, along.mid, along.rad, wide[:m], rho
+                found.append((*t, curve.box.centre[m], near.d[m], radius[m], *numbers))
         t_mid, t_rad, alpha, rate, reach, *rest = map(np.array, zip(*found, strict=True))
         z_mid, z_rad, slope, slope_rad, wides, steps = rest
         return _Links(Ball(t_mid, t_rad), alpha, rate, reach, Ball(z_mid, z_rad), Ball(slope, slope_rad), wides, steps)

@@ -12,7 +12,11 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from enumsol.arithmetic.balls import SAFE, TINY, UNIT, Ball, upper_norm
-from enumsol.trusted.space.leaf_equations import Leaf, State, around_middle
+from enumsol.trusted.space.leaf_equations import (
+    Leaf,
+    State,
+    around_middle,
+)
 
 if TYPE_CHECKING:
     from enumsol.support.array_types import Floats, Mask

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from enumsol.arithmetic.balls import SAFE, UNIT, Ball, determinant_sign, nearly_singular, rough_inverse
-from enumsol.trusted.same_roots import Apart, told_apart
+from enumsol.trusted.joint_roots import Apart, told_apart
 from enumsol.trusted.space.leaf_conditions import Drift, are_outside, drift_in, is_broken, slacks, span_in
 from enumsol.trusted.space.leaf_equations import (
     ROUNDED_ANGLE,

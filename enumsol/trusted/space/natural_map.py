@@ -1,6 +1,6 @@
-"""The natural map of a problem in 3D, y - P(y + rho w), in balls: P, its derivatives, and Krawczyk's operator on sets.
+"""The projection P of the natural map y - P(y + rho w) of a problem in 3D, and its derivatives on sets, in balls.
 
-What boxes with one solution (theory, section 12.7) and boxes of curves of solutions (theory, section 12.8) share.
+See theory, sections 12.7 and 12.8.
 """
 
 from __future__ import annotations
@@ -14,8 +14,6 @@ import numpy as np
 from enumsol.arithmetic.balls import ROOT_TINY, SAFE, TINY, UNIT, Ball, gamma, upper_norm, upper_sum
 from enumsol.support.array_types import Floats, Indices, Mask
 
-#: What a writer of proofs asks for beyond what a checker does.
-MARGIN = 2.0**-10
 #: Places of the unit matrix in blocks of both components of tau.
 _BOTH = [[1], [2]], [[1], [2]]
 
@@ -551,103 +549,20 @@ def _middle(x: Ball) -> tuple[Floats, Floats, Floats]:
     return length, e, np.column_stack([-e[:, 1], e[:, 0]])
 
 
-def middle_inverse(M: Ball) -> tuple[Floats, Floats] | None:
-    """Y, about the inverse of the middle of M, and a bound of |I - Y M|; None where that middle is singular."""
-    try:
-        Y = np.asarray(np.linalg.inv(M.mid), dtype=np.float64)
-    except np.linalg.LinAlgError:
-        return None
-    if not np.all(np.isfinite(Y)):
-        return None
-    return Y, (Ball.exact(np.eye(len(Y))) - Ball.exact(Y) @ M).size
+def are_steps(rho: Floats, tau: Indices) -> bool:
+    """True if numbers serve as rho of a natural map: positive, and one for both components of tau of every node.
 
+    Zeros of a map with two numbers there are no solutions (theory, (12.10) and (12.16)).
 
-@dataclass(frozen=True)
-class Step:
-    """x - Y N(x), N the natural map, for all x = c + t d + b within a radius of a point c, |t| <= h.
-
-    Every value is c + t d + move + t drift + E b + sum (a_k + t b_k + t_k V_k b) G_k with |t_k| <= 1/2, the a_k of
-    ``first``, and all other numbers within the bounds below. Without d, h is 0.
-
-    Attributes
+    Parameters
     ----------
-    move : Ball of shape (m,)
-    E : (m, m) array
-        Upper bounds.
-    G, V : Balls of shapes (m, k) and (k, m)
-    Y : (m, m) array
-    drift : (m,) array
-        Upper bounds.
-    first : (k,) array
-        The numbers a.
-    along : (k,) array
-        Upper bounds of |b|.
+    rho : (m,) array
+        In the variables in which discs are round.
+    tau : (p, 2) array of int
+        See ``Discs``.
     """
-
-    move: Ball
-    E: Floats
-    G: Ball
-    V: Ball
-    Y: Floats
-    drift: Floats
-    first: Floats
-    along: Floats
-
-    @cached_property
-    def slopes(self) -> Floats:
-        """Bounds of V G / 2."""
-        return np.asarray(0.5 * (self.V @ Ball.exact(self.G.mid)).size)
-
-    def shares(self, radius: Floats, h: float = 0.0, moved: float = 1.0) -> Floats | None:
-        """s > 0 for which what is called xi below is less; no claim. None where there is none."""
-        more = 1.0 + 4.0 * MARGIN
-        asked = more * (0.5 * self.V.size @ radius + self.along * h + moved * np.abs(self.first))
-        try:
-            found = np.linalg.solve(np.eye(len(self.V.mid)) - more * self.slopes, asked)
-        except np.linalg.LinAlgError:
-            return None
-        return np.asarray(found + TINY) if np.all(found >= 0) else None
-
-    def balanced(self, h: float, moved: float, room: float) -> Floats | None:
-        """A radius with which the step seems to contract, with as much room; no claim. None where there is none."""
-        G, V, m = np.abs(self.G.mid), self.V.size, len(self.move.mid)
-        more = 1.0 + 8.0 * MARGIN
-        K = np.block([[room * self.E, room * (self.E @ G + self.G.rad)], [0.5 * more * V, more * self.slopes]])
-        first = moved * np.abs(self.first) + self.along * h
-        asked = room * np.concatenate([moved * self.move.size + self.drift * h, first])
-        try:
-            found = np.linalg.solve(np.eye(len(K)) - K, asked)
-        except np.linalg.LinAlgError:
-            return None
-        return np.asarray(found[:m]) if np.all(found >= 0) and np.all(np.isfinite(found)) else None
-
-    def reach(self, radius: Floats, shares: Floats) -> Floats:
-        """Bounds of G s + b with |b| <= radius and |s| <= shares."""
-        return (radius + upper_product(np.abs(self.G.mid), shares)) * SAFE
-
-    def xi(self, radius: Floats, shares: Floats, h: float = 0.0, moved: float = 1.0) -> Floats:
-        """Bounds of the shares of what comes out; without what does not depend on b and t where ``moved`` is 0."""
-        own = upper_product(self.slopes, shares) + 0.5 * upper_product(self.V.size, radius)
-        return np.asarray((own + self.along * h + moved * np.abs(self.first)) * SAFE)
-
-    def left(self, radius: Floats, shares: Floats, h: float = 0.0, moved: float = 1.0) -> Floats:
-        """Bounds of the rest of what comes out; without ``move`` where ``moved`` is 0."""
-        out = moved * self.move.size + upper_product(self.E, self.reach(radius, shares)) + self.drift * h
-        return np.asarray((out + upper_product(self.G.rad, self.xi(radius, shares, h, moved))) * SAFE)
-
-    def contracts(self, radius: Floats, shares: Floats, errors: float, h: float = 0.0, moved: float = 1.0) -> bool:
-        """True if the step maps all G s + b with |b| <= radius and |s| <= shares to such with less of both."""
-        more = SAFE * (1.0 + (errors - 1.0) * MARGIN)
-        xi, left = self.xi(radius, shares, h, moved), self.left(radius, shares, h, moved)
-        return bool(np.all(xi * more < shares) and np.all(left * SAFE * more < radius))
-
-
-def split_off(G: Ball, vector: Ball) -> tuple[Floats, Ball]:
-    """Numbers s, and the rest of a ball of vectors without G s, which is small where it lies near the columns of G."""
-    if not G.shape[1]:
-        return np.zeros(0), vector
-    s = np.asarray(np.linalg.lstsq(G.mid, vector.mid)[0])
-    return s, vector - (Ball.exact(G.mid) @ Ball.exact(s[:, None]))[:, 0]
+    one, other = tau[np.all(tau >= 0, axis=1)].T
+    return bool(np.all(np.isfinite(rho)) and np.all(rho > 0) and np.array_equal(rho[one], rho[other]))
 
 
 def upper_product(matrix: Floats, vector: Floats) -> Floats:

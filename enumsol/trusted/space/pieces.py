@@ -1,4 +1,4 @@
-"""The trusted core in 3D over a piece of alpha: no solution, or all of them in a box (theory, section 12.9)."""
+"""The trusted core in 3D over a piece of alpha: no solution, all in a box, or on one arc (theory, section 12.9)."""
 
 from __future__ import annotations
 
@@ -12,28 +12,33 @@ import numpy as np
 
 from enumsol.arithmetic.balls import SAFE, TINY, UNIT, Ball
 from enumsol.condensation.space_condensed import PieceSpace
-from enumsol.trusted.space.leaf_arcs import LeafArc, arc_of
+from enumsol.trusted.space.leaf_conditions import by_parameter, chosen_parameter, condition_rates, slacks
+from enumsol.trusted.space.leaf_equations import (
+    ROUNDED_ANGLE,
+    Leaf,
+    around_middle,
+    patterns,
+    turned,
+    with_free_bounds,
+)
 from enumsol.trusted.space.leaves import Open, SpaceRoot, settle
-from enumsol.trusted.space.piece_forms import only_on_curve
-from enumsol.trusted.space.resultants import is_unbalanced_in_space, swept_floating_margin
-from enumsol.trusted.space.sector_rows import swept_margin
-from enumsol.trusted.space.space_uniqueness import is_complete
+from enumsol.trusted.space.resultants import is_unbalanced_in_space
+from enumsol.trusted.space.sector_margins import swept_margin
+from enumsol.trusted.space.space_uniqueness import is_complete, only_on_curve
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from numpy.typing import NDArray
-
-    from enumsol.condensation.space_condensed import AlphaSpace, PieceSpace
-    from enumsol.support.array_types import Codes
+    from enumsol.condensation.space_condensed import AlphaSpace, EnclosedSpace, PieceSpace
+    from enumsol.support.array_types import Codes, Floats
     from enumsol.trusted.space.curve_runs import KnownCurve, Run
     from enumsol.trusted.space.sector_rows import Row
     from enumsol.trusted.space.solution_curve import AlphaProblem, SolutionCurve
 
-    Array = NDArray[np.float64]
-
 #: What a writer of proofs asks for beyond what a checker does, of the size of a box.
 _MARGIN = 2.0**-10
+#: How often the box of an arc is made wider, and by how much more than is needed.
+_WIDENINGS, _ROOM = 6, 1.125
 #: How often a piece is narrowed for a leaf, to which multiples of its half, and where that is too little.
 _NARROWINGS, _GRID, _NARROWER = 8, 1 << 12, Fraction(3, 2)
 #: Halvings of the way through a box.
@@ -70,18 +75,15 @@ class AlphaPiece:
         return self.space.at(self.low), self.space.at(self.high)
 
     def margin(
-        self, codes: Sequence[int], rows: Sequence[Row], values: Array | tuple[Array, Array], errors: float = 1.0
+        self, codes: Sequence[int], rows: Sequence[Row], values: Floats | tuple[Floats, Floats], errors: float = 1.0
     ) -> float:
         """Proven lower bound on the energy over a partial assignment and the piece; positive: there is no solution.
 
         ``values`` are the multipliers of rows at both ends, between which they are affine in alpha.
         """
-        (low, high), middle = self.ends, self.space.at(self.middle)
-        if not middle.held:
-            return swept_floating_margin((low, high), middle, codes, rows, (values[0], values[1]), errors)
-        return swept_margin(self.ends, middle, codes, rows, (values[0], values[1]), errors)
+        return swept_margin(self.ends, self.space.at(self.middle), codes, rows, (values[0], values[1]), errors)
 
-    def is_unbalanced(self, codes: Sequence[int], z: Array) -> bool:
+    def is_unbalanced(self, codes: Sequence[int], z: Floats) -> bool:
         """True if at no alpha of the piece any forces below a partial assignment are in balance with the load, by z.
 
         Of a body that nothing holds.
@@ -153,7 +155,7 @@ class AlphaPiece:
             found = piece.held(codes)
         return piece, found
 
-    def lies_on(self, known: KnownCurve, run: Run, codes: Sequence[int], numbers: Array, errors: float = 1.0) -> bool:
+    def lies_on(self, known: KnownCurve, run: Run, codes: Sequence[int], numbers: Floats, errors: float = 1.0) -> bool:
         """True if all solutions with the statuses of an assignment, at every alpha of the piece, are those of a run.
 
         Parameters
@@ -304,3 +306,113 @@ def _inverse(F: Ball) -> Ball:
     inverse = 1.0 / F.mid
     # |1 / x - 1 / m| = |x - m| / (x m)
     return Ball(inverse, (F.rad / (F.mid - F.rad) * inverse + 4 * UNIT * inverse) * SAFE)
+
+
+# -- arcs of leaves ----------------------------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True, eq=False)
+class LeafArc:
+    """Solutions with the statuses of a leaf over a piece of alpha, those of the leaf among them, that are one arc.
+
+    Attributes
+    ----------
+    statuses : codes, one for all sectors
+    centre : (q, 2) array
+        A direction for every node in a sector.
+    angle, radius : (q,) arrays
+        All solutions with these statuses, with angles up to ``radius`` from ``angle``, are on the arc; of a body that
+        nothing holds, those within the bounds of its rigid displacement.
+    """
+
+    statuses: Codes
+    centre: Floats
+    angle: Floats
+    radius: Floats
+
+    def has(self, root: SpaceRoot, codes: Codes) -> bool:
+        """True if the root of a leaf, at an alpha of the piece, is on the arc."""
+        if patterns(codes) != self.statuses:
+            return False
+        shift = turned(self.centre, root.centre)
+        away = np.abs(shift + root.angle - self.angle) + root.angle_rad + ROUNDED_ANGLE
+        return bool(np.all(away <= self.radius))
+
+
+def arc_of(system: EnclosedSpace, codes: Sequence[int], found: SpaceRoot | Open, errors: float = 1.0) -> LeafArc | None:
+    """The arc on which all solutions of a leaf over a piece of alpha lie, as a connected part of it.
+
+    Parameters
+    ----------
+    system : over a piece of alpha
+    codes : complete
+    found : what ``settle`` says of the leaf
+    errors : 1 proves; a writer of proofs takes more
+    """
+    with np.errstate(over="ignore", invalid="ignore", divide="ignore"):
+        leaf, box = Leaf(system, codes), (found.angle, found.angle_rad, 1.0 + (errors - 1.0) * _MARGIN)
+        arc = _arc_in(leaf, *box)
+        loosened = leaf.loosened() if arc is None else None
+        return arc if loosened is None else _arc_in(loosened, *box)
+
+
+def _box_of_all(leaf: Leaf, angle: Floats, radius: Floats) -> tuple[Floats, Floats] | None:
+    """A box of all unknowns but s that holds all zeros with angles in a box; None if there is none, or no such."""
+    if not leaf.free:
+        return angle, radius
+    cut = with_free_bounds(leaf, np.r_[angle, np.zeros(len(leaf.room))], np.r_[radius, leaf.room])
+    return cut if cut is not None and np.all(np.isfinite(cut[1])) else None
+
+
+def _arc_in(leaf: Leaf, angle: Floats, radius: Floats, errors: float) -> LeafArc | None:
+    """The arc, if every condition holds all along it or changes its sign once at most.
+
+    Zeros z = (psi, s) of the equations are a graph over one of these unknowns, z_k: with (12.22d), u being the other
+    ones, the right-hand side maps a box of u into its interior for every z_k, so that there is one zero for each of
+    them, and these are an arc. A normal force that is left free is between psi and s, and so are rigid modes that the
+    equations leave free. ``angle``, ``radius``: a box that holds the directions of all solutions.
+    """
+    box = _box_of_all(leaf, angle, radius) if leaf.piece else None
+    if box is None:
+        return None
+    (angle, radius), turning, q = box, len(angle), len(box[0])
+    point = leaf.over(angle, 0.0 * radius, still=True)
+    chosen = None if point is None or not point.whole_J.finite else chosen_parameter(point, radius)
+    if point is None or chosen is None:
+        return None
+    k, Y = chosen
+    others = np.delete(np.arange(q + 1), k)
+    psi = others[others < q]
+    for _ in range(_WIDENINGS):
+        state, sizes = leaf.over(angle, radius), np.r_[radius, 1.0]
+        if state is None or not state.whole_J.finite:
+            return None
+        room, reach = sizes[others], Ball(np.zeros(1), sizes[k : k + 1])[0]
+        left, along, start = around_middle(leaf, Y, k, (angle, radius), (state, point))
+        beside = left @ Ball(np.zeros(q), room) + start
+        needed = (beside + along * reach).size * errors
+        if np.all(needed < room) or (k < q and not needed[-1] < 1.0):
+            break
+        radius = radius.copy()
+        radius[psi] = np.maximum(radius[psi], _ROOM * needed[: len(psi)])
+        # solutions at wider angles may have other forces
+        cut = _box_of_all(leaf, angle[:turning], radius[:turning])
+        if cut is None:
+            return None
+        radius[turning:] = np.maximum(radius, (np.abs(cut[0] - angle) + cut[1]) * SAFE)[turning:]
+    # u' = (I - Y J_u) u' - Y J_k, and I - Y J_u is a contraction in the norm of the box
+    wide = left.size @ room * SAFE
+    share = 1.0 - float(np.max(wide / room, initial=0.0)) * SAFE
+    if state is None or not (np.all(needed < room) and share > 0):
+        return None
+    most = float(np.max(along.size / room, initial=0.0)) / share * SAFE
+    rate = Ball(along.mid, (along.rad + wide * most) * SAFE + TINY)
+    m, over = len(leaf.E), (state, point)
+    middle, turn = by_parameter(leaf, over, k, beside, along)
+    bounds, rates = middle + turn * reach, by_parameter(leaf, over, k, beside, rate)[1]
+    s_rate = rate[-1] if k < q else Ball.exact(np.array(1.0))
+    holding = slacks(leaf, bounds[:m], bounds[m:], angle, radius) > 0
+    mid, rad = condition_rates(leaf, bounds[:m], (rates[:m], rates[m:], s_rate), angle, radius)
+    if not np.all(holding | (np.abs(mid) > rad * errors * SAFE)):
+        return None
+    return LeafArc(patterns(leaf.codes), leaf.centre, angle[:turning], radius[:turning])

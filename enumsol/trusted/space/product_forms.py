@@ -15,9 +15,9 @@ import scipy.linalg
 from enumsol.arithmetic.balls import SAFE, TINY, UNIT, Ball, upper_norm
 from enumsol.model.sectors import SECTORS, contains, direction, end_number
 from enumsol.trusted.space.boxed_solution import Box
-from enumsol.trusted.space.natural_map import MARGIN
+from enumsol.trusted.space.krawczyk import MARGIN
 from enumsol.trusted.space.sector_rows import CONTACT, OPEN, STICK, UNDECIDED
-from enumsol.trusted.space.space_uniqueness import LARGEST_UNIT
+from enumsol.trusted.space.space_uniqueness import displacements, moderate_units
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -38,8 +38,6 @@ _ACROSS = 0.0, 0.25, 0.5, 0.75, 1.0
 #: The squares of the equations get so many times the weight that the products ask for; a form is proven by a
 #: matrix that is within this of the unit matrix.
 _HEAVIER, _NEAR = 16.0, 0.5
-#: A box around an ellipsoid is wider than that by this factor.
-_ROOM = 1.01
 
 
 def _times(a: Floats, b: Floats) -> Floats:
@@ -116,7 +114,7 @@ class Frame:
             raise ValueError("a form of products where a node is undecided")
         m, p, tau, unit = len(system.g), len(system.tau), system.tau, system.unit
         S, point = Ball(system.S, system.S_rad), Ball.exact(centre)
-        w = Ball(system.g, system.g_rad) - (S @ point[:, None])[:, 0]
+        w = displacements(system, point)
         parts, values = Ball(np.zeros((p, 5, m)), np.zeros((p, 5, m))), Ball(np.zeros((p, 5)), np.zeros((p, 5)))
         nodes = np.arange(p)
         parts.mid[nodes, 0, nodes] = 1.0
@@ -215,7 +213,7 @@ class Ellipsoid:
         ValueError
             A node is undecided.
         """
-        if np.max(np.maximum(system.unit, 1.0 / system.unit)) > LARGEST_UNIT or not np.all(np.isfinite(centre)):
+        if not moderate_units(system.unit) or not np.all(np.isfinite(centre)):
             return None
         with np.errstate(all="ignore"):
             frame = Frame.of(system, codes, centre)
@@ -302,15 +300,6 @@ class Ellipsoid:
             size = (away.size + upper_norm(columns.size, axis=1) * self.reach) * SAFE
             return bool(np.all(size * SAFE <= (1.0 - (errors - 1.0) * MARGIN) * box.radius))
 
-    def box(self, rho: Floats) -> Box | None:
-        """A box that holds the ellipsoid, for boxes with such a rho; no claim."""
-        T, system = self.T, self.frame.system
-        with np.errstate(all="ignore"):
-            radius = np.linalg.norm(T + rho[:, None] * (system.S @ T), axis=1) * self.reach * _ROOM
-        if self.empty or not np.all(np.isfinite(radius)) or not np.all(radius > 0):
-            return None
-        return Box.of(system, self.frame.centre, radius, rho)
-
 
 def refines(codes: Sequence[int], over: Sequence[int]) -> bool:
     """True if every node has a status in one assignment that its status in another one allows."""
@@ -328,7 +317,7 @@ def _within(code: int, over: int) -> bool:
 def _columns(frame: Frame, sums: Floats) -> tuple[Floats, Floats] | None:
     """Columns in which the form with the squares of the equations is near the unit matrix, and their weights' roots.
 
-    No claim: what is near it is proven.
+    Nothing rests on it: what is near it is proven.
     """
     rows = frame.equations.mid
     size = np.linalg.norm(rows, axis=1)

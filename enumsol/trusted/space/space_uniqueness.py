@@ -8,24 +8,44 @@ the solution is known from a curve of solutions (theory, section 12.9).
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Any
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any, Self
 
 import numpy as np
 
-from enumsol.arithmetic.balls import SAFE, TINY, UNIT, Ball, dense_eigenvalue_bound, upper_norm
+from enumsol.arithmetic.balls import SAFE, TINY, UNIT, Ball, upper_norm
 from enumsol.model.sectors import DEEPEST, SECTORS, is_sector, level_of
 from enumsol.trusted.space.leaves import SpaceRoot, settle
-from enumsol.trusted.space.sector_rows import CONTACT, FRICTIONLESS, OPEN, SLIP_MINUS, SLIP_PLUS, STICK, UNDECIDED
+from enumsol.trusted.space.sector_rows import (
+    ALONG,
+    CONTACT,
+    FREE,
+    FRICTIONLESS,
+    GAP,
+    LEFT,
+    NONNEGATIVE,
+    OPEN,
+    RIGHT,
+    SLIP,
+    SLIP_MINUS,
+    SLIP_PLUS,
+    STICK,
+    UNDECIDED,
+    Row,
+    row_sign,
+    sector_row_terms,
+)
+from enumsol.trusted.uniqueness_forms import Multipliers, RootForm, RootReference, UniqueForm
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
+    from fractions import Fraction
     from typing import Self
 
-    from enumsol.condensation.space_condensed import EnclosedSpace
-    from enumsol.support.array_types import Floats, Mask
+    from enumsol.condensation.space_condensed import EnclosedSpace, PieceSpace
+    from enumsol.support.array_types import Codes, Floats, Mask
+    from enumsol.trusted.space.curve_runs import CurveParts
 
-    Flags = Mask
 
 #: Directions whose squared length is as near to one stand for the direction of length one.
 _UNIT_LENGTH = 2.0**-40
@@ -51,12 +71,12 @@ class LooseSolution:
 
     y: Ball
     w: Ball
-    open: Flags
-    stick: Flags
-    slip: Flags
+    open: Mask
+    stick: Mask
+    slip: Mask
     index: int
 
-    def certain(self, rubs: Flags) -> tuple[int, ...] | None:
+    def certain(self, rubs: Mask) -> tuple[int, ...] | None:
         """Open, stick or contact (slip, or no friction) of every node; None where one is not certain."""
         several = self.open & (self.stick | self.slip) | rubs & self.stick & self.slip
         codes = np.where(self.open, OPEN, np.where(rubs & self.stick, STICK, CONTACT))
@@ -83,6 +103,11 @@ class LooseSolution:
         return cls(y, w, loose, stick, slip, index, **more)
 
 
+def displacements(system: EnclosedSpace, y: Ball) -> Ball:
+    """w = g - S y."""
+    return Ball(system.g, system.g_rad) - (Ball(system.S, system.S_rad) @ y[:, None])[:, 0]
+
+
 class OnlySolution(LooseSolution):
     """The one solution of a problem."""
 
@@ -106,8 +131,8 @@ def only_solution_in_space(
         S is not proven positive definite.
     """
     with np.errstate(all="ignore"):
-        form = _Form.of(system, numbers)
-        return None if form is None else form.enclosed(normal, errors)
+        weights = SpaceWeights.of(system, numbers)
+        return None if weights is None else _enclosed(system, weights, normal, errors)
 
 
 def only_root(system: EnclosedSpace, numbers: Floats, codes: Sequence[int], errors: float = 1.0) -> SpaceRoot | None:
@@ -118,12 +143,13 @@ def only_root(system: EnclosedSpace, numbers: Floats, codes: Sequence[int], erro
     if not is_complete(system, codes):
         return None
     with np.errstate(all="ignore"):
-        form = _Form.of(system, numbers)
+        weights = SpaceWeights.of(system, numbers)
+        form = None if weights is None else weights.form(system)
         root = None if form is None else settle(system, codes)
         # the degree of a problem is +1
-        if form is None or not isinstance(root, SpaceRoot) or root.index != 1:
+        if weights is None or form is None or not isinstance(root, SpaceRoot) or root.index != 1:
             return None
-        return root if form.serves(root.y, root.w, errors) else None
+        return root if form.serves(weights.distances(system, root.y, root.w), errors) else None
 
 
 def lone_root(
@@ -146,12 +172,12 @@ def lone_root(
     if not is_complete(system, leaf) or not all(map(_allows, codes, leaf)):
         return None
     with np.errstate(all="ignore"):
-        root = settle(system, leaf)
-        if not isinstance(root, SpaceRoot):
+        root, weights = settle(system, leaf), SpaceWeights.of(system, numbers)
+        if weights is None or not isinstance(root, SpaceRoot):
             return None
-        forms = (_Form.of(system, numbers, equations(system, codes, weight)) for weight in EQUATION_WEIGHTS)
-        served = any(form is not None and form.serves(root.y, root.w, errors) for form in forms)
-        return root if served else None
+        off = weights.distances(system, root.y, root.w)
+        forms = (weights.form(system, equations(system, codes, weight)) for weight in EQUATION_WEIGHTS)
+        return root if any(form is not None and form.serves(off, errors) for form in forms) else None
 
 
 def _allows(code: int, final: int) -> bool:
@@ -216,7 +242,7 @@ class SpaceWeights:
     nu: Floats
     theta: Floats
     off: Floats
-    whole: Flags
+    whole: Mask
 
     @classmethod
     def of(cls, system: EnclosedSpace, numbers: Floats) -> SpaceWeights | None:
@@ -248,9 +274,23 @@ class SpaceWeights:
         known = (system.tau < 0) | ((self.theta == 0) & (self.off == 0)[:, None])
         return Ball(turn.mid, np.where(known, 0.0, turn.rad))
 
-    def push(self, system: EnclosedSpace) -> Floats:
-        """nu times the units of the tau, of shape (p, 2)."""
-        return np.asarray(self.nu * np.where(system.tau >= 0, system.unit[system.tau], 1.0))
+    def multipliers(self, system: EnclosedSpace) -> Multipliers:
+        """D of all nodes."""
+        # units are powers of two: what is rounded is less than TINY
+        unit = np.where(system.tau >= 0, system.unit[system.tau], 1.0)
+        push = Ball(self.nu * unit, np.where(self.nu == 0, 0.0, TINY))
+        return Multipliers(system.tau, self.mu, self.kappa, self.turn(system), push, unit)
+
+    def form(self, system: EnclosedSpace, held: Ball | None = None) -> UniqueForm | None:
+        """Q of theory, (12.7); None where it is not proven definite, or not with the squares of some rows."""
+        if not (system.smallest_eigenvalue > 0 and in_range(system)):
+            return None
+        S, wide = Ball(system.S, system.S_rad), self.wide > 0
+        return UniqueForm.of(S, self.multipliers(system), np.where(wide, 1.0, 0.0), self.wide, held)
+
+    def distances(self, system: EnclosedSpace, y: Ball, w: Ball) -> Floats:
+        """``off_at`` of all nodes, (p,)."""
+        return np.array([self.off_at(system, i, y, w) for i in range(len(system.tau))])
 
     def gap_serves(self, system: EnclosedSpace, i: int, w: Ball) -> bool:
         """True if theta of a node without load serves for all w in a ball, by its gap (theory, (12.6))."""
@@ -292,203 +332,269 @@ class SpaceWeights:
         return off
 
 
+def moderate_units(unit: Floats) -> bool:
+    """True if nothing underflows with these units of tau."""
+    return bool(np.max(np.maximum(unit, 1.0 / unit)) <= LARGEST_UNIT)
+
+
 def in_range(system: EnclosedSpace) -> bool:
     """True if nothing underflows with units of tau, and the discs have the radius one."""
     discs = system.discs
-    return bool(
-        np.max(np.maximum(system.unit, 1.0 / system.unit)) <= LARGEST_UNIT
-        and np.all((discs.mid == 1.0) & (discs.rad == 0))
-    )
+    return moderate_units(system.unit) and bool(np.all((discs.mid == 1.0) & (discs.rad == 0)))
+
+
+def _enclosed(system: EnclosedSpace, numbers: SpaceWeights, normal: Floats, errors: float) -> OnlySolution | None:
+    """The only solution by its distance from a point, None where it is not proven to be the only one."""
+    tau, p, form = system.tau, len(system.tau), numbers.form(system)
+    n = np.maximum(normal, 0.0)
+    if form is None or n.shape != (p,) or not np.all(np.isfinite(n)):
+        return None
+    y, turn = Ball(np.zeros(len(system.g)), np.zeros(len(system.g))), form.numbers.turn
+    y.mid[:p] = n
+    for k in range(2):
+        has = (tau[:, k] >= 0) & (n > 0)
+        y[tau[has, k]] = Ball.exact(n[has]) * turn[has, k]
+    change = _change(system, numbers, turn, n, displacements(system, y))
+    reach = form.numbers.moved(change) / form.least * SAFE
+    if not np.isfinite(reach):
+        return None
+    y = Ball(y.mid, (y.rad + reach) * SAFE)
+    w = displacements(system, y)
+    # open at every solution
+    for i in np.flatnonzero((n == 0) & (w.mid[:p] + w.rad[:p] < 0)):
+        y.rad[[i, *tau[i][tau[i] >= 0]]] = 0.0
+    w = displacements(system, y)
+    alone = form.serves(numbers.distances(system, y, w), errors)
+    return OnlySolution.of(system, y, w, 1) if alone else None
+
+
+def _change(system: EnclosedSpace, numbers: SpaceWeights, turn: Ball, n: Floats, w: Ball) -> Floats:
+    """Bound of the change of the load, row by row, that makes a point with these lambda_n a solution."""
+    p, change, apart = len(n), w.size.copy(), n == 0
+    change[:p][apart] = np.maximum(w.mid[:p] + w.rad[:p], 0.0)[apart] * SAFE
+    for i, places in enumerate(system.tau):
+        t = places[places >= 0]
+        if numbers.whole[i]:
+            # v along theta
+            unit, theta = system.unit[t], turn[i][places >= 0]
+            along = max(float(numbers.theta[i][places >= 0] @ (w.mid[t] / unit)), 0.0)
+            change[t] = (w[t] - theta * Ball.exact(along * unit * unit)).size
+        elif apart[i] and numbers.gap_serves(system, i, w):
+            change[t] = 0.0
+    return change
+
+
+# -- over a piece of alpha --------------------------------------------------------------------------------------------
 
 
 @dataclass(frozen=True)
-class _Form:
-    """Q of theory, (12.7), and what it proves; in the units of FrictionUnits.
+class PieceWeights:
+    """The numbers of the form over a piece, node by node.
+
+    Where there is no tau, components are 0.
 
     Attributes
     ----------
-    least : float
-        Positive lower bound of the eigenvalues of Q, for every theta that ``numbers`` stand for.
-    turn : Ball of shape (p, 2)
-        theta over the unit of the tau.
-    push : (p, 2) array
-        nu times that unit.
-    held : rows that are held at zero
+    mu, kappa : (p,) arrays
+        Positive, with |nu| <= mu over the radius of every disc.
+    nu : (p, 2) array
+    thetas : pair of (p, 2) arrays
+        At both ends of the piece; times the radii of the discs there they are psi, which is affine between.
     """
 
-    system: EnclosedSpace
-    numbers: SpaceWeights
-    turn: Ball
-    push: Floats
-    held: Ball | None
-    least: float
+    mu: Floats
+    kappa: Floats
+    nu: Floats
+    thetas: tuple[Floats, Floats]
 
     @classmethod
-    def of(cls, system: EnclosedSpace, values: Floats, held: Ball | None = None) -> _Form | None:
-        """None where Q is not proven definite, or not with the squares of the rows that are held at zero."""
-        numbers = SpaceWeights.of(system, values)
-        if numbers is None or not system.smallest_eigenvalue > 0:
+    def of(cls, system: PieceSpace, numbers: Floats) -> PieceWeights | None:
+        """From one array: mu and kappa of all nodes, then nu and both thetas of all tau, in the order of y; or None."""
+        p, m = len(system.tau), len(system.g)
+        if numbers.shape != (2 * p + 3 * (m - p),) or not np.all(np.isfinite(numbers)):
             return None
-        if not in_range(system):
-            return None
-        form = cls(system, numbers, numbers.turn(system), numbers.push(system), held, 0.0)
-        least = form.smallest(np.zeros(len(system.tau)), np.zeros(len(system.tau)))
-        return replace(form, least=least) if least > 0 else None
+        (mu, kappa), vectors = numbers[: 2 * p].reshape(2, p), numbers[2 * p :].reshape(3, m - p)
+        place = np.where(system.tau >= 0, system.tau - p, m - p)
+        nu, low, high = (np.append(vector, 0.0)[place] for vector in vectors)
+        with np.errstate(over="ignore", invalid="ignore"):
+            right = (mu > 0) & (kappa > 0) & (upper_norm(nu, axis=1) * system.largest_discs * SAFE <= mu)
+        return cls(mu, kappa, nu, (low, high)) if np.all(right) else None
 
-    def smallest(self, off: Floats, lost: Floats) -> float:
-        """Lower bound of the eigenvalues of Q less what is lost where theta is off, at most 0 where none is positive.
-
-        Where theta is not off ``lost`` is 0; elsewhere any positive numbers are right.
-        """
-        numbers, wide = self.numbers, self.numbers.wide > 0
-        off, lost = np.where(wide, 1.0, off), np.where(wide, numbers.wide, lost)
-        return least_eigenvalue(self.system, (numbers.mu, numbers.kappa), self.turn, self.push, (off, lost), self.held)
-
-    # -- enclosure -------------------------------------------------------------------------------------------------
-
-    def enclosed(self, normal: Floats, errors: float) -> OnlySolution | None:
-        """The only solution by its distance from a point, None where it is not proven to be the only one."""
-        tau, p = self.system.tau, len(self.system.tau)
-        n = np.maximum(normal, 0.0)
-        if n.shape != (p,) or not np.all(np.isfinite(n)):
-            return None
-        y = Ball(np.zeros(len(self.system.g)), np.zeros(len(self.system.g)))
-        y.mid[:p] = n
-        for k in range(2):
-            has = (tau[:, k] >= 0) & (n > 0)
-            part = Ball.exact(n[has]) * self.turn[has, k]
-            y.mid[tau[has, k]], y.rad[tau[has, k]] = part.mid, part.rad
-        reach = self._moved(self._change(n, self._displacements(y))) / self.least * SAFE
-        if not np.isfinite(reach):
-            return None
-        y = Ball(y.mid, (y.rad + reach) * SAFE)
-        w = self._displacements(y)
-        # open at every solution
-        for i in np.flatnonzero((n == 0) & (w.mid[:p] + w.rad[:p] < 0)):
-            y.rad[[i, *tau[i][tau[i] >= 0]]] = 0.0
-        w = self._displacements(y)
-        return OnlySolution.of(self.system, y, w, 1) if self.serves(y, w, errors) else None
-
-    def _displacements(self, y: Ball) -> Ball:
-        S, g = Ball(self.system.S, self.system.S_rad), Ball(self.system.g, self.system.g_rad)
-        return g - (S @ Ball(y.mid[:, None], y.rad[:, None]))[:, 0]
-
-    def _change(self, n: Floats, w: Ball) -> Floats:
-        """Bound of the change of the load, row by row, that makes a point with these lambda_n a solution."""
-        system, numbers, p = self.system, self.numbers, len(n)
-        change = w.size.copy()
-        apart = n == 0
-        change[:p][apart] = np.maximum(w.mid[:p] + w.rad[:p], 0.0)[apart] * SAFE
-        for i, places in enumerate(system.tau):
-            t = places[places >= 0]
-            if numbers.whole[i]:
-                # v along theta
-                unit, theta = system.unit[t], self.turn[i][places >= 0]
-                along = max(float(numbers.theta[i][places >= 0] @ (w.mid[t] / unit)), 0.0)
-                change[t] = (w[t] - theta * Ball.exact(along * unit * unit)).size
-            elif apart[i] and numbers.gap_serves(system, i, w):
-                change[t] = 0.0
-        return change
-
-    def _moved(self, change: Floats) -> float:
-        """Upper bound of ||D'delta||, |delta| <= change."""
-        numbers, tau, p = self.numbers, self.system.tau, len(self.system.tau)
-        moved = np.zeros_like(change)
-        moved[:p] = numbers.mu * change[:p]
-        for k in range(2):
-            has = tau[:, k] >= 0
-            t, kappa = tau[has, k], numbers.kappa[has]
-            moved[:p][has] += kappa * self.turn.size[has, k] * change[t]
-            moved[t] = np.abs(self.push[has, k]) * change[:p][has] + kappa * change[t]
-        return float(upper_norm(moved * SAFE + TINY) * SAFE)
-
-    # -- uniqueness ------------------------------------------------------------------------------------------------
-
-    def serves(self, y: Ball, w: Ball, errors: float) -> bool:
-        """True if any solution within these balls is the only one, given that all lie there or that it exists."""
-        numbers, system = self.numbers, self.system
-        off = np.array([numbers.off_at(system, i, y, w) for i in range(len(system.tau))])
-        lost = numbers.kappa * off * slip_sizes(system)
-        if not np.all(np.isfinite(lost)):
-            return False
-        if self.least > errors * upper_norm(lost * SAFE + TINY) * SAFE:
-            return True
-        # node by node
-        apart = off > 0
-        return self.smallest(np.where(apart, errors * off * SAFE, 0.0), np.where(apart, lost + TINY, 0.0)) > 0
+    def multipliers(self, system: PieceSpace, psi: Ball) -> Multipliers:
+        """D of all nodes at an end of the piece."""
+        unit = np.where(system.tau >= 0, system.unit[system.tau], 1.0)
+        turn = Ball(psi.mid / unit, psi.rad / unit * SAFE + TINY * (system.tau >= 0))
+        return Multipliers(system.tau, self.mu, self.kappa, turn, Ball(self.nu * unit, TINY * (self.nu != 0)), unit)
 
 
-def slip_sizes(system: EnclosedSpace) -> Floats:
-    """Upper bounds of the norms of the rows of S that give v, node by node, (p,)."""
-    found = np.zeros(system.tau.shape)
-    size = (np.abs(system.S) + system.S_rad) * SAFE
-    for k in range(2):
-        has = system.tau[:, k] >= 0
-        t = system.tau[has, k]
-        found[has, k] = upper_norm(size[t], axis=1) / system.unit[t] * SAFE
-    return np.asarray(upper_norm(found, axis=1))
-
-
-def least_eigenvalue(
-    system: EnclosedSpace,
-    factors: tuple[Floats, Floats],
-    turn: Ball,
-    push: Floats,
-    rest: tuple[Floats, Floats],
-    held: Ball | None = None,
-) -> float:
-    """Lower bound of the smallest eigenvalue of Q, less what is lost, plus held'held; at most 0 if none is positive.
-
-    D d has mu d_n + push . d_tau for lambda_n, and kappa (d_tau - turn d_n) for tau (theory, (12.7)).
+def only_on_curve(
+    system: PieceSpace,
+    piece: tuple[Fraction, Fraction],
+    codes: Sequence[int],
+    numbers: Floats,
+    parts: CurveParts,
+    errors: float = 1.0,
+) -> bool:
+    """True if all solutions over a piece with the statuses of an assignment are those of a curve.
 
     Parameters
     ----------
-    system : EnclosedSpace
-    factors : mu and kappa, (p,) arrays
-    turn, push : Ball and array of shape (p, 2)
-        Over the unit of the tau, and times that unit.
-    rest : (off, lost), (p,) arrays
-        How far ``turn``, times the unit, may be off, and what is subtracted for this, theory, (12.8): where ``off`` is
-        positive any positive ``lost`` is right, elsewhere both are 0.
-    held : rows, as balls, that are zero on the subspace of which Q is asked
+    system : PieceSpace
+        Over the piece.
+    piece : its ends
+    codes : (partial) status codes; a sector counts as contact
+    numbers : see ``PieceWeights.of``
+    parts : of a curve that has a solution at every alpha of the piece
+    errors : what is not known of theta counts as often: 1 proves, a writer of proofs takes more
     """
-    tau, p, (mu, kappas), (off, wide) = system.tau, len(system.tau), factors, rest
-    unit = np.where(tau >= 0, system.unit[tau], 1.0)
-    S, form = Ball(system.S, system.S_rad), weighted(system, mu, kappas, turn, push)
-    spread = Ball.exact(np.zeros_like(S.mid))
-    for k in range(2):
-        has = np.flatnonzero(tau[:, k] >= 0)
-        t, kappa = tau[has, k], kappas[has]
-        used = np.flatnonzero(wide[has] > 0)
-        # weights at least kappa off / sqrt(s), for any rounding
-        weight = kappa[used] * off[has[used]] / np.sqrt(wide[has[used]]) / unit[has[used], k]
-        rows = S[t[used]] * Ball.exact((weight * SAFE + TINY)[:, None])
-        spread = spread + Ball(rows.mid.T, rows.rad.T) @ rows
-    Q = form - Ball(0.5 * spread.mid, 0.5 * spread.rad)
-    if held is not None:
-        Q = Q + Ball(held.mid.T, held.rad.T) @ held
-    normal = np.arange(p)
-    Q.mid[normal, normal] -= 0.5 * wide
-    Q.rad[normal, normal] += 2 * UNIT * (np.abs(Q.mid[normal, normal]) + wide)
-    mid = 0.5 * (Q.mid + Q.mid.T)
-    # the symmetric part of the form lies in the mean of both triangles
-    rad = (np.maximum(Q.rad, Q.rad.T) + 4 * UNIT * np.abs(mid)) * SAFE
-    if not (np.all(np.isfinite(mid)) and np.all(np.isfinite(rad))):
-        return 0.0
-    return float((dense_eigenvalue_bound(mid) - float(upper_norm(rad))) / SAFE)
+    weights = PieceWeights.of(system, numbers)
+    if weights is None or not len(parts.alpha.mid) or not parts.allowed(codes):
+        return False
+    if not float(piece[1] - piece[0]) > TINY:
+        return False
+    if not moderate_units(system.unit):
+        return False
+    with np.errstate(all="ignore"):
+        # psi at both ends of the piece, between which the form is between those of both
+        psi = [_times(theta, discs) for theta, discs in zip(weights.thetas, system.end_discs, strict=True)]
+        off, S = how_far_off(system, piece, weights, psi, parts) * (errors * SAFE), Ball(system.S, system.S_rad)
+        ends = [weights.multipliers(system, end) for end in psi]
+        lost = np.where(off > 0, weights.kappa * off * ends[0].slip_sizes(S) + TINY, 0.0)
+        if not np.all(np.isfinite(lost)):
+            return False
+        assigned = any(code != UNDECIDED for code in codes)
+        held = [equations(system, codes, weight) for weight in EQUATION_WEIGHTS] if assigned else [None]
+        return any(all(UniqueForm.of(S, end, off, lost, rows) is not None for end in ends) for rows in held)
 
 
-def weighted(system: EnclosedSpace, mu: Floats, kappa: Floats, turn: Ball, push: Floats) -> Ball:
-    """D'S, (m, m), for multipliers as of ``least_eigenvalue``."""
-    tau, p, S = system.tau, len(system.tau), Ball(system.S, system.S_rad)
-    form = Ball(S.mid.copy(), S.rad.copy())
-    along = S[:p] * Ball.exact(mu[:, None])
-    form.mid[:p], form.rad[:p] = along.mid, along.rad
-    for k in range(2):
-        has = np.flatnonzero(tau[:, k] >= 0)
-        t, factor = tau[has, k], kappa[has]
-        turned = form[has] - S[t] * (turn[has, k] * Ball.exact(factor))[:, None]
-        pushed = S[t] * Ball.exact(factor[:, None]) + S[has] * Ball(push[has, k], np.full(len(has), TINY))[:, None]
-        for rows, part in ((has, turned), (t, pushed)):
-            form.mid[rows], form.rad[rows] = part.mid, part.rad
-    return form
+def _times(theta: Floats, discs: Ball) -> Ball:
+    return Ball.exact(theta) * Ball(discs.mid[:, None], discs.rad[:, None])
+
+
+def _shares(piece: tuple[Fraction, Fraction], alpha: Ball) -> Ball:
+    """Places of alphas in a piece, from -1 to 1."""
+    middle, half = (piece[0] + piece[1]) / 2, (piece[1] - piece[0]) / 2
+    near, inverse = float(middle), 1.0 / float(half)
+    # rounded to nearest
+    factor = Ball(np.array(inverse), np.array(4 * UNIT * inverse))
+    share = (alpha - Ball(np.array(near), np.array(UNIT * abs(near) + TINY))) * factor
+    low, high = np.maximum(share.mid - share.rad * SAFE, -1.0), np.minimum(share.mid + share.rad * SAFE, 1.0)
+    return Ball(0.5 * (low + high), (0.5 * np.maximum(high - low, 0.0) + 4 * UNIT) * SAFE)
+
+
+def how_far_off(
+    system: PieceSpace, piece: tuple[Fraction, Fraction], weights: PieceWeights, psi: Sequence[Ball], parts: CurveParts
+) -> Floats:
+    """Bound of the distance of psi from r theta with a theta that serves the curve's solution, (p,), at all alphas.
+
+    Where nothing better is known |theta| <= 1.
+    """
+    rubs, shares = np.any(system.tau >= 0, axis=1), _shares(piece, parts.alpha)
+    half = Ball.exact(np.array(0.5))
+    middle, change = (psi[0] + psi[1]) * half, (psi[1] - psi[0]) * half
+    at = Ball(middle.mid[None], middle.rad[None]) + shares[:, None, None] * change
+    reference = system.references
+    inverse = 1.0 / reference
+    r = parts.F * Ball(inverse, np.where(rubs, 2 * UNIT * inverse, 0.0))
+    theta, far = parts.thetas
+    apart = upper_norm((Ball.exact(theta) * r[:, :, None] - at).size, axis=2) + r.size * far
+    unknown = upper_norm(at.size, axis=2) + r.size
+    off = np.minimum(np.where(np.isfinite(apart), apart, np.inf), unknown) * SAFE * SAFE
+    off = np.where(_gap_serves(weights, reference, at, r, parts), 0.0, off)
+    return np.where(rubs, np.max(off, axis=0), 0.0)
+
+
+def _gap_serves(weights: PieceWeights, reference: Floats, psi: Ball, r: Ball, parts: CurveParts) -> Mask:
+    """Mask of nodes whose gap lets psi itself serve, (N, p): (mu - r |nu|) |w_n| >= kappa (r |v| - psi . v)."""
+    inside = np.all([upper_norm(theta, axis=1) <= 1.0 for theta in weights.thetas], axis=0)
+    normal, slip = parts.slips
+    gap = np.where(parts.open, -(normal.mid + normal.rad * SAFE), 0.0) / SAFE
+    length = upper_norm(slip.size, axis=2)
+    along = psi * slip
+    ahead = along[:, :, 0] + along[:, :, 1]
+    needed = r.size * length * SAFE - (ahead.mid - ahead.rad * SAFE) + 16 * UNIT * (r.size * length + ahead.size)
+    room = weights.mu - upper_norm(weights.nu, axis=1) * r.size * SAFE - 4 * UNIT * weights.mu
+    needed = weights.kappa * reference * needed * SAFE * SAFE + TINY
+    return np.asarray(inside & (gap > 0) & (room > 0) & (room * gap / SAFE >= needed))
+
+
+@dataclass(frozen=True)
+class LeafReference(RootReference[Row]):
+    """The strict root of a leaf, and its form."""
+
+    system: EnclosedSpace
+    root: SpaceRoot
+
+    @classmethod
+    def of(cls, system: EnclosedSpace, leaf: Codes, numbers: Floats, balance: float, share: float) -> Self | None:
+        """None where the leaf holds no strict root, or its form is not proven definite where G d = 0.
+
+        Parameters
+        ----------
+        system : EnclosedSpace
+        leaf : final codes
+        numbers : see ``SpaceWeights.of``; no node serves any theta
+        balance : factor of |G d|^2
+        share : c of theory, section 14.11
+        """
+        if not (0 <= balance < np.inf and abs(share) < np.inf) or not is_complete(system, leaf):
+            return None
+        with np.errstate(all="ignore"):
+            weights = SpaceWeights.of(system, numbers)
+            if weights is None or np.any(weights.wide > 0) or not in_range(system):
+                return None
+            root = settle(system, leaf)
+            if not isinstance(root, SpaceRoot):
+                return None
+            off, loaded = weights.distances(system, root.y, root.w), (root.y, np.array(leaf) != OPEN)
+            form = RootForm.of(
+                Ball(system.S, system.S_rad), system.rows.G, weights.multipliers(system), off, loaded, balance, share
+            )
+        return None if form is None else cls(system, tuple(leaf), form, root)
+
+    def allow(self, codes: Sequence[int], rows: Sequence[Row], tight: Sequence[Row]) -> bool:
+        """True if the first rows are equations, and the others nonnegative but not positive at the root.
+
+        Raises
+        ------
+        ValueError
+            A node has no such row.
+        """
+        for row in (*rows, *tight):
+            sector_row_terms(row, self.system.tau, len(self.system.g))
+        return all(self.is_equation(codes, row) for row in rows) and all(self.is_tight(codes, row) for row in tight)
+
+    def is_equation(self, codes: Sequence[int], row: Row) -> bool:
+        """True if a row on displacements vanishes below an assignment and at the root."""
+        node = row[1]
+        return row[0] in (GAP, SLIP) and row_sign(codes[node], row) == row_sign(self.selection[node], row) == FREE
+
+    def is_tight(self, codes: Sequence[int], row: Row) -> bool:
+        """True if a row on displacements is nonnegative below an assignment, and not positive at the root."""
+        kind, node, _ = row
+        if kind not in (GAP, ALONG, LEFT, RIGHT) or row_sign(codes[node], row) not in (NONNEGATIVE, FREE):
+            return False
+        code = self.selection[node]
+        if code == STICK or (kind == GAP and code != OPEN):
+            return True
+        with np.errstate(all="ignore"):
+            found = self.rows([row]) @ self.root.w[:, None]
+        return bool(found.high[0, 0] <= 0)
+
+    def rows(self, rows: Sequence[Row]) -> Ball:
+        """Rows as coefficients of w.
+
+        Raises
+        ------
+        ValueError
+            A node has no such row.
+        """
+        size, unit = len(self.system.g), self.system.row_unit
+        found = Ball.exact(np.zeros((len(rows), size)))
+        for k, row in enumerate(rows):
+            for i, coefficient in zip(*sector_row_terms(row, self.system.tau, size), strict=True):
+                found.mid[k, i - size] = coefficient * unit[i]
+                # a power of two; those of directions are rounded
+                found.rad[k, i - size] = 0.0 if row[0] in (GAP, SLIP, ALONG) else UNIT * abs(found.mid[k, i - size])
+        found.rad[:] = np.where(found.rad > 0, found.rad * SAFE + TINY, 0.0)
+        return found

@@ -1,0 +1,172 @@
+"""Which arcs of a branch graph run away (theory, section 15): verdicts over ranges of alpha."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from enumsol.errors import InvalidArgumentError
+from enumsol.model.problem import ContactProblem
+from enumsol.roots.stability import Stabilities, friction_over
+from enumsol.search.stability import Proven, StabilitySearch
+from enumsol.support.deadlines import look
+from enumsol.trusted.running_away import Growing
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator, Sequence
+
+    import scipy.sparse as sp
+
+    from enumsol.branches.elements import Arc
+    from enumsol.model.problem3d import AnyProblem
+    from enumsol.roots.stability import Setting, Verdict
+    from enumsol.support.array_types import ArrayLike
+
+#: Parts of an arc in which nothing is proven at once are halved so often, and those where a verdict changes once more.
+_HALVINGS = 6
+#: Growing motions of a range of alpha are looked for between such powers of two: K(mu) is enclosed at few mu then.
+_GRIDS = (1 / 32, 1 / 8, 1 / 2)
+
+
+@dataclass(frozen=True)
+class Span:
+    """A range of alpha on an arc with one verdict.
+
+    Attributes
+    ----------
+    low, high : float
+    verdict : "runs away", "does not run away" or "undecided"
+        The first two are proven for every alpha between them. A short undecided range between two others encloses
+        the alpha at which the verdict changes.
+    growth : (float, float) or None
+        Bounds of the growth rate of a motion in the range [1 / time].
+    """
+
+    low: float
+    high: float
+    verdict: Verdict
+    growth: tuple[float, float] | None = None
+
+
+class ArcStabilities:
+    """Verdicts on arcs of one problem in 2D.
+
+    Parameters
+    ----------
+    problem : ContactProblem
+    mass : (n, n) array_like or sparse, or None
+        In place of ``problem.inertia``.
+
+    Raises
+    ------
+    InvalidArgumentError
+        The problem is one in 3D, or has no mass.
+    InvalidProblemError
+        The mass cannot be used.
+    """
+
+    def __init__(self, problem: AnyProblem, mass: ArrayLike | sp.sparray | sp.spmatrix | None = None) -> None:
+        if not isinstance(problem, ContactProblem):
+            raise InvalidArgumentError(
+                "the graph is one in 3D, where directions of slip change along an arc; expected one in 2D, or "
+                "graph.roots_at(alpha).stability()"
+            )
+        self._problem, self._asked = problem, Stabilities(problem, mass)
+        self._constant = not np.any(problem.affine_friction[1])
+        self._hints: list[Proven] = []
+
+    def spans(self, arc: Arc) -> tuple[Span, ...]:
+        """Verdicts along an arc, from its lower end to its upper one."""
+        if arc.grazing or arc.dimension:
+            return (Span(arc.lo, arc.hi, "undecided"),)
+        self._hints = []
+        if self._constant:
+            found = self._piece(arc, arc.lo, arc.hi)
+            return (found or Span(arc.lo, arc.hi, "undecided"),)
+        first = _joined(self._halved(arc, arc.lo, arc.hi, _HALVINGS))
+        return tuple(_joined(self._refined(arc, first)))
+
+    def _refined(self, arc: Arc, spans: list[Span]) -> Iterator[Span]:
+        """The same, with the places where the verdict changes known more closely."""
+        for k, span in enumerate(spans):
+            beside = {other.verdict for other in (*spans[max(k - 1, 0) : k], *spans[k + 1 : k + 2])}
+            if span.verdict == "undecided" and len(beside) == 2:
+                yield from self._halved(arc, span.low, span.high, _HALVINGS)
+            else:
+                yield span
+
+    def _halved(self, arc: Arc, low: float, high: float, halvings: int) -> Iterator[Span]:
+        """Verdicts in a part of an arc, halved as often as it takes."""
+        look()
+        found, middle = self._piece(arc, low, high), 0.5 * (low + high)
+        if found is not None:
+            yield found
+        elif not halvings or not low < middle < high:
+            yield Span(low, high, "undecided")
+        else:
+            yield from self._halved(arc, low, middle, halvings - 1)
+            yield from self._halved(arc, middle, high, halvings - 1)
+
+    def _piece(self, arc: Arc, low: float, high: float) -> Span | None:
+        """The verdict in a part of an arc, if it is one that can be proven there at once."""
+        active = [frozenset({status}) for status in arc.statuses]
+        whole = list(self._asked.settings_of(active, friction_over(self._problem, low, high)))
+        middle = 0.5 * (low + high)
+        at = list(self._asked.settings_of(active, friction_over(self._problem, middle, middle)))
+        quiet = True
+        for k, setting in enumerate(whole):
+            verdict = self._verdict(setting, at[k])
+            if isinstance(verdict, tuple):
+                return Span(low, high, "runs away", verdict)
+            quiet = quiet and verdict
+        return Span(low, high, "does not run away") if quiet else None
+
+    def _verdict(self, setting: Setting, at: Setting) -> bool | tuple[float, float]:
+        """Bounds of a growth rate in a range of alpha, or whether nothing grows; ``at`` is the same at its middle."""
+        for hint in self._hints:
+            extended = _extended(hint, setting)
+            if extended is not False:
+                return extended
+        proven = StabilitySearch(at.stiffness, at.motions).run()
+        self._hints = [proven, *self._hints[:3]]
+        return _extended(proven, setting)
+
+
+def _extended(proven: Proven, setting: Setting) -> bool | tuple[float, float]:
+    """What is proven at one alpha, if it holds for a range of them."""
+    stiffness, motions = setting.stiffness, setting.motions
+    for tried, _ in proven.growing:
+        at = StabilitySearch(stiffness, motions).zero_near(tried)
+        if at is None:
+            continue
+        for step in _GRIDS:
+            place = float(np.log2(at)) / step
+            below = np.floor(place - 0.25)
+            low, high = (float(np.exp2(step * (below + k))) for k in (0, 1 if place - below < 0.75 else 2))
+            wider = Growing(low, high, tried.slides, tried.touching)
+            if wider.found(stiffness, motions) is not None:
+                return float(np.sqrt(low) * (1 - 2.0**-50)), float(np.sqrt(high) * (1 + 2.0**-50))
+    if proven.growing or proven.gaps:
+        return False
+    return all(leaf.holds(stiffness, motions) for _, _, leaves in proven.ranges for leaf in leaves)
+
+
+def _joined(spans: Iterator[Span]) -> list[Span]:
+    """Neighbours with the same verdict as one."""
+    joined: list[Span] = []
+    for span in spans:
+        if joined and joined[-1].verdict == span.verdict:
+            last = joined.pop()
+            both = (last.growth, span.growth)
+            growth = (min(b[0] for b in both if b), max(b[1] for b in both if b)) if all(both) else None
+            joined.append(Span(last.low, span.high, span.verdict, growth))
+        else:
+            joined.append(span)
+    return joined
+
+
+def verdict_of(spans: Sequence[Span]) -> str:
+    """The verdicts along an arc in words: one, or several in turn."""
+    return ", then ".join(dict.fromkeys(span.verdict for span in spans))

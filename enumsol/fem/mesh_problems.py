@@ -1,0 +1,471 @@
+"""From a mesh with named parts to its scene and its contact problem, by a call or by a TOML file.
+
+A body is of one material, or of one for each of its named parts.
+"""
+
+from __future__ import annotations
+
+import difflib
+import inspect
+from collections.abc import Callable, Mapping
+from dataclasses import replace
+from typing import TYPE_CHECKING, Any, Literal, TypeVar
+
+import numpy as np
+
+from enumsol.errors import InvalidArgumentError, InvalidProblemError
+from enumsol.fem import conditions
+from enumsol.fem.bases import nodal_basis
+from enumsol.fem.conditions import Options, refuse_old_friction
+from enumsol.fem.contacts import contacts_of
+from enumsol.fem.mesh_files import read_mesh
+from enumsol.fem.meshes import PartedMesh, lame
+from enumsol.fem.scene_checks import refuse_overlaps, refuse_pairs, refuse_walls, scene_notes
+from enumsol.fem.scenes import Scene
+from enumsol.support.arguments import file_path, finite_number, one_of, positive_number, shown, text_of
+from enumsol.support.array_arguments import short_vector
+from enumsol.support.files import unreadable
+from enumsol.support.messages import shortened
+from enumsol.support.plotting import checked_units
+from enumsol.support.saved import LARGEST_TOML, toml_from
+
+if TYPE_CHECKING:
+    import os
+    from collections.abc import Sequence
+    from pathlib import Path
+
+    from enumsol.fem.conditions import Names, Plane, Vectors
+    from enumsol.model.problem3d import AnyProblem
+    from enumsol.support.array_types import ArrayLike, Floats
+
+T = TypeVar("T")
+
+
+def scene_of(source: PartedMesh | str | os.PathLike[str] | Any, options: Options) -> Scene:
+    """Scene of a mesh, or of what `read_mesh` takes.
+
+    Raises
+    ------
+    InvalidArgumentError
+        As `mesh_problem`.
+    """
+    mesh = source if isinstance(source, PartedMesh) else read_mesh(source, options.groups)
+    options = options.with_friction_along_axes(mesh.points.shape[1])
+    if options.plane is None:
+        options = replace(options, plane=_plane(mesh))
+    coefficients = lame_of(mesh, options)
+    thickness = thickness_of(mesh, options.thickness)
+    body = replace(nodal_basis(mesh.points, mesh.cells, labels=mesh.labels), thickness=thickness)
+    held = conditions.supports_of(mesh, options)
+    masses = masses_of(mesh, options.density, thickness)
+    contacts = contacts_of(body, mesh, options, held)
+    forces = conditions.part_forces(body, mesh, options.load, options.pressure)
+    if options.body_force is not None:
+        forces = forces + body.volume_forces(body_force_of(mesh, options.body_force))
+    slope = conditions.part_forces(body, mesh, options.load_slope, options.pressure_slope, "_slope")
+    springs, pieces = conditions.part_springs(body, mesh, options.spring), conditions.pieces_of(mesh)
+    scene = Scene(mesh, options, body, held, contacts, forces, slope, springs, coefficients, pieces, masses)
+    refuse_overlaps(scene)
+    refuse_walls(scene)
+    refuse_pairs(scene)
+    scene.coefficients  # noqa: B018 (refuses those that cannot be used)
+    scene.notes.extend(scene_notes(scene))
+    return scene
+
+
+def _plane(mesh: PartedMesh) -> Plane:
+    """Plane of a body where no option says it: strain, unless the file has elements of plane stress."""
+    stressed = [name for name in mesh.types if name.startswith("CPS")]
+    if stressed:
+        raise InvalidArgumentError(
+            f"plane is not given, and the cells are elements of type {stressed[0]}, which are of plane stress; "
+            "expected plane = 'stress', or 'strain' if the type only carries the mesh, as in files of gmsh"
+        )
+    return "strain"
+
+
+def lame_of(mesh: PartedMesh, options: Options) -> Floats:
+    """Lame coefficients of all cells, (2,), or of each where they differ, (M, 2).
+
+    Raises
+    ------
+    InvalidArgumentError
+        A constant is not admissible, a name does not exist, or a cell has no value or several.
+    """
+    plane = options.plane
+    if mesh.points.shape[1] == 3 and plane != "strain":
+        raise InvalidArgumentError(f"plane is {plane!r} of a body in 3D; expected it for plane meshes only")
+    values: list[Any] = [
+        _of_cells(mesh, options.young, "young", positive_number),
+        _of_cells(mesh, options.poisson, "poisson", finite_number),
+        _of_cells(mesh, plane, "plane", lambda value, name: one_of(value, name, ("strain", "stress"))),
+    ]
+    if not any(isinstance(value, list) for value in values):
+        return np.asarray(lame(*values))
+    count = len(mesh.cells)
+    each = list(zip(*(value if isinstance(value, list) else [value] * count for value in values), strict=True))
+    known = {constants: lame(*constants) for constants in dict.fromkeys(each)}
+    return np.array([known[constants] for constants in each])
+
+
+def thickness_of(mesh: PartedMesh, value: object) -> Floats | None:
+    """Thickness of every cell of a plane body, (M,); None for one [length].
+
+    Raises
+    ------
+    InvalidArgumentError
+        As `lame_of`, or the body is not plane.
+    """
+    given = _of_cells(mesh, value, "thickness", positive_number)
+    if given == 1:
+        return None
+    if mesh.points.shape[1] == 3:
+        raise InvalidArgumentError("thickness is given for a body in 3D; expected it for plane meshes only")
+    return np.broadcast_to(np.array(given, dtype=np.float64), len(mesh.cells))
+
+
+def masses_of(mesh: PartedMesh, density: object, thickness: Floats | None) -> Floats | None:
+    """Mass per volume, in 2D per area, of every cell, (M,); None where it is uniform and not given.
+
+    Raises
+    ------
+    InvalidArgumentError
+        As `lame_of`.
+    """
+    if density is None:
+        return None if thickness is None or np.ptp(thickness) == 0 else thickness
+    given = np.array(_of_cells(mesh, density, "density", positive_number), dtype=np.float64)
+    return np.asarray(np.broadcast_to(given, len(mesh.cells)) * (1.0 if thickness is None else thickness))
+
+
+def body_force_of(mesh: PartedMesh, value: object) -> Floats:
+    """Force per volume of every cell, (M, d); parts of the body without one have none [force / length^3].
+
+    Raises
+    ------
+    InvalidArgumentError
+        It is not that, or a name does not exist.
+    """
+    dimension = mesh.points.shape[1]
+    if not isinstance(value, Mapping):
+        return np.tile(short_vector(value, "body_force", dimension), (len(mesh.cells), 1))
+    density = np.zeros((len(mesh.cells), dimension))
+    for part, force in conditions.by_part(value, "body_force").items():
+        density[mesh.body(part)] += short_vector(force, f"body_force of {part}", dimension)
+    return density
+
+
+def _of_cells(mesh: PartedMesh, value: object, name: str, read: Callable[[Any, str], T]) -> T | list[T]:
+    """A value of all cells, or a list of one for each if it is given by names of parts of the body."""
+    if not isinstance(value, Mapping):
+        return read(value, name)
+    found: list[T | None] = [None] * len(mesh.cells)
+    of_part: dict[int, str] = {}
+    for part, given in conditions.by_part(value, name).items():
+        own = read(given, f"{name} of {part}")
+        for row in mesh.body(part).tolist():
+            if found[row] is not None and found[row] != own:
+                raise InvalidArgumentError(
+                    f"{name} is given for {of_part[row]} and for {part}, which share cells; expected one value"
+                )
+            found[row], of_part[row] = own, part
+    each = [own for own in found if own is not None]
+    if len(each) < len(found):
+        first = found.index(None)
+        others = [part for part, rows in mesh.bodies.items() if first in rows]
+        raise InvalidArgumentError(
+            f"{name} is not given for {len(found) - len(each)} of {len(found)} cells"
+            f"{f', those of {others[0]}' if others else ', which belong to no named part'}; expected it for all"
+        )
+    return each
+
+
+#: What ``pairs`` may be called in TOML files.
+_PAIRS = "contact_pair"
+
+
+def mesh_problem(
+    mesh: PartedMesh | str | os.PathLike[str] | Any,
+    *,
+    young: float | Mapping[str, float],
+    poisson: float | Mapping[str, float],
+    contact: Names = (),
+    pairs: Sequence[Sequence[Any]] = (),
+    plane: Plane | Mapping[str, Plane] | None = None,
+    thickness: float | Mapping[str, float] = 1.0,
+    density: float | Mapping[str, float] | None = None,
+    friction: float | Mapping[str, float] | None = None,
+    friction_slope: float | Mapping[str, float] | None = None,
+    friction2: float | Mapping[str, float] | None = None,
+    friction2_slope: float | Mapping[str, float] | None = None,
+    axis: ArrayLike | None = None,
+    clamp: Names = (),
+    symmetry: Names = (),
+    displacement: Mapping[str, Sequence[Any]] | None = None,
+    spring: Vectors = None,
+    load: Vectors = None,
+    load_slope: Vectors = None,
+    pressure: Mapping[str, float] | None = None,
+    pressure_slope: Mapping[str, float] | None = None,
+    body_force: ArrayLike | Mapping[str, ArrayLike] | None = None,
+    gap: float | Mapping[str, float] = 0.0,
+    obstacle: Mapping[str, Sequence[float]] | None = None,
+    max_rigid_displacement: float | Literal["auto"] | None = None,
+    groups: str | None = None,
+) -> AnyProblem:
+    """Contact problem of a body whose mesh has named parts.
+
+    `mesh_scene` describes in words and in a picture what the arguments stand for.
+
+    Contact is by nodes: every node of the contact parts that is not held has a row, including, in second order, the
+    nodes between corners. On triangles with six nodes, the facets of tetrahedra of second order, only the nodes between
+    corners have rows, since a uniform pressure has no part at the corners. Rows are displacements of nodes, not
+    weighted, and lambda are the nodal forces that do the work on them. In 2D rows are in the order of the nodes along
+    the boundary.
+
+    Normals are those of the boundary, averaged around each node with its shape function as weight, or those of the
+    obstacle. At nodes on a plane of symmetry they are projected on it; the component across it stays in the problem,
+    uncoupled and at rest.
+
+    Parameters
+    ----------
+    mesh : PartedMesh, path, or meshio.Mesh
+        What `read_mesh` returns or takes. Parts are called by their names.
+    young, poisson : float, or mapping of names to float
+        Young's modulus [force / length^2] and Poisson's ratio [-], of the whole body or of every part of it
+        (``mesh.bodies``).
+    contact : name or names
+        The contact boundary, in contact with a rigid foundation.
+    pairs : sequence of (slave, master) or (slave, master, gap)
+        Parts of two bodies that may touch each other. The nodes of the first part are the contact nodes; each is in
+        contact with the point of a facet of the second part on the line along its normal (theory, section 11.8). Nodes
+        that face no facet have no contact. The gap is the distance along the normal, or the one that is given [length].
+    plane : {"strain", "stress"}, or mapping of names to them, optional
+        In 2D, whether strain or stress is plane, for the whole body or for every part of it; by default strain. It has
+        to be given for a file whose elements are of plane stress (CPS4 and the like).
+    thickness : float, or mapping of names to float
+        In 2D, of the whole body or of every part of it; all forces and stiffnesses are multiplied by it. By default
+        they are per unit thickness [length].
+    density : float, or mapping of names to float, optional
+        Mass per volume, of the whole body or of every part of it, for `stability`; a uniform one changes no verdict and
+        need not be given [force time^2 / length^4].
+    friction, friction_slope : float, in 3D also (float, float), or mapping of names to these, optional
+        Coefficient friction + alpha friction_slope [-], of all contact nodes or of every contact part and of the first
+        part of every pair (the slope is 0 for parts that are not named); in 3D a pair is along both axes. A node of two
+        parts has the coefficient of the one that `contact` names first. Without both the coefficient is alpha; without
+        one of them that one is 0.
+    friction2, friction2_slope : float, or mapping of names to float, optional
+        In 3D, coefficient along the second axis, in place of pairs; without both as along the first.
+    axis : (3,) array_like, optional
+        In 3D, direction whose projection on the tangent plane is the first axis; default as `solid_contact_problem`.
+    clamp : name or names
+        Parts that are held in all components.
+    symmetry : name or names
+        Parts in planes perpendicular to an axis, held in the direction of that axis: planes of symmetry, rollers.
+    displacement : mapping of names to components
+        Given displacements in x, y (and z), each a number [length], or ``"free"`` or None where it is not given.
+    spring : mapping of names to (kn, kt)
+        Springs to the ground along the normal and across it, per area (in 2D per length) [force / length^3].
+    load, load_slope : mapping of names to vectors
+        Force per area (in 2D per length) in x, y (and z), and its derivative with respect to alpha [force / length^2].
+    pressure, pressure_slope : mapping of names to float
+        Force per area along the inward normal, and its derivative with respect to alpha [force / length^2].
+    body_force : vector, or mapping of names to vectors, optional
+        Force per volume, such as the weight, on the whole body or on parts of it [force / length^3].
+    gap : float, or mapping of names to float
+        Initial gap along the normals, for all contact nodes or, like friction, by parts (0 for parts that are not
+        named), in addition to the distance to the obstacle or within a pair; a negative gap is a press fit [length].
+    obstacle : mapping of one kind to numbers, optional
+        The rigid foundation of the contact parts, where it does not have the shape of the body: ``{"plane": (x, y, nx,
+        ny)}`` by a point and the direction from it to the body, ``{"circle": (x, y, r)}``, or ``{"hole": (x, y, r)}``,
+        a circle that the body is inside of; in 3D ``plane`` with six numbers, ``sphere`` and ``hole`` with four.
+    max_rigid_displacement : float, "auto" or None
+        Lets bodies that supports and springs leave free move as a whole: their rigid modes are found, and solutions are
+        sought within this bound of the rigid displacement, ten times the size of the mesh for "auto" (theory, section
+        14) [length]. By default such a body is refused.
+    groups : str, optional
+        As in `read_mesh`.
+
+    Returns
+    -------
+    ContactProblem or ContactProblem3D
+        With ``coordinates``, ``mesh`` and, as ``node_ids``, the numbers of the nodes in the mesh; in 3D also with
+        ``areas``. Its ``notes``, a tuple of sentences, say what may not have been intended: nodes of a pair that face
+        nothing, for example, have no contact.
+
+    Raises
+    ------
+    InvalidArgumentError
+        The mesh cannot be used, a part does not exist (those that do are listed), or an argument is not of the stated
+        form.
+    InvalidProblemError
+        Nothing but contact holds the body or a part of it, or the data of the problem are not admissible.
+
+    Examples
+    --------
+    >>> from enumsol import fem
+    >>> mesh = fem.rectangle(4, 2).parted()
+    >>> problem = fem.mesh_problem(
+    ...     mesh, young=2.5, poisson=0.25, clamp="left", contact="bottom", load={"top": (0.3, -1)}, friction=0.5
+    ... )
+    >>> problem.n, problem.p
+    (24, 4)
+    """
+    given = Options(
+        young=young, poisson=poisson, contact=contact, pairs=pairs, plane=plane, thickness=thickness, density=density,
+        friction=friction, friction_slope=friction_slope, friction2=friction2, friction2_slope=friction2_slope,
+        axis=axis, clamp=clamp, symmetry=symmetry, displacement=displacement, spring=spring,
+        load=load, load_slope=load_slope, pressure=pressure, pressure_slope=pressure_slope, body_force=body_force,
+        gap=gap, obstacle=obstacle, max_rigid_displacement=max_rigid_displacement, groups=groups,
+    )  # fmt: skip
+    return scene_of(mesh, given).problem()
+
+
+def mesh_scene(mesh: PartedMesh | str | os.PathLike[str] | Any, **options: Any) -> Scene:
+    """Scene that a mesh and options of `mesh_problem` describe: ``print(scene)``, ``scene.plot()``, ``scene.notes``.
+
+    The scene lists the bodies, the parts with their areas, the resultant of the loads, the contact nodes with their
+    gaps, which bodies are free to move, and what may not have been intended. ``scene.problem()`` is what `mesh_problem`
+    returns.
+
+    Parameters
+    ----------
+    mesh, **options
+        As in `mesh_problem`.
+
+    Returns
+    -------
+    Scene
+
+    Raises
+    ------
+    InvalidArgumentError
+        As in `mesh_problem`, or there is an option that it does not have.
+
+    Examples
+    --------
+    >>> from enumsol import fem
+    >>> scene = fem.mesh_scene(
+    ...     fem.rectangle(4, 2).parted(), young=2.5, poisson=0.25, contact="bottom", clamp="left", friction=0.5
+    ... )
+    >>> print(scene)
+    mesh      15 nodes, 16 triangles, from (0, 0) to (1, 1)
+    bodies    the body: 16 cells, area 1, held
+    ...
+    contact   4 contact nodes of bottom, gap 0
+    ...
+    """
+    check_keys(options)
+    return scene_of(mesh, Options(**(_defaults() | options)))
+
+
+def _defaults() -> dict[str, Any]:
+    """Options of `mesh_problem` with their defaults; ``inspect.Parameter.empty`` for those that have none."""
+    known = inspect.signature(mesh_problem).parameters.items()
+    return {name: parameter.default for name, parameter in known if name != "mesh"}
+
+
+def read_mesh_problem(path: str | os.PathLike[str]) -> AnyProblem:
+    r"""Contact problem that a TOML file describes: the options of `mesh_problem`, with ``mesh`` a path from its folder.
+
+    In the file, ``pairs`` may also be called ``contact_pair``.
+
+    The file may also have a ``title`` and ``units`` of forces and lengths such as "N,mm", for what commands print,
+    and the ``steps`` of a history, which the command ``enumsol history`` reads.
+
+    Parameters
+    ----------
+    path : str or path-like
+
+    Raises
+    ------
+    InvalidProblemError
+        The file cannot be read, is not TOML, lacks a key or has one that is not known, or describes no problem. The
+        message begins with the path.
+    MissingDependencyError
+        meshio is not installed.
+
+    Examples
+    --------
+    >>> import meshio, pathlib
+    >>> from enumsol import fem
+    >>> cells = [("quad", [[0, 1, 2, 3]]), ("line", [[0, 1], [2, 3]])]
+    >>> meshio.Mesh([[0, 0], [1, 0], [1, 1], [0, 1]], cells, cell_data={"part": [[0], [1, 2]]}).write("square.vtu")
+    >>> text = "mesh = 'square.vtu'\ngroups = 'part'\nyoung = 2.5\npoisson = 0.25\nclamp = '2'\ncontact = '1'"
+    >>> _ = pathlib.Path("square.toml").write_text(text)
+    >>> fem.read_mesh_problem("square.toml").p
+    2
+    """
+    return _of_file(path, lambda scene: scene.problem())
+
+
+def read_mesh_scene(path: str | os.PathLike[str]) -> Scene:
+    """Scene that a TOML file describes, see `mesh_scene`.
+
+    Parameters
+    ----------
+    path : str or path-like
+
+    Raises
+    ------
+    InvalidProblemError, MissingDependencyError
+        As `read_mesh_problem`, except that what does not make a problem may still be a scene.
+    """
+    return _of_file(path, lambda scene: scene)
+
+
+def _of_file(path: object, made: Callable[[Scene], T]) -> T:
+    place = file_path(path, "path")
+    try:
+        options = _toml(place)
+        name = file_path(options.pop("mesh", None), "mesh", "the name of a mesh file in quotes")
+        options.pop("steps", None)  # of enumsol history
+        checked_units(options.pop("units", None))
+        text_of(options.pop("title", ""), "title")
+        check_keys(options, also=(_PAIRS,))
+        written = "{0}.{1} = {2}".format, "{0} = {2}".format
+        source = refuse_old_friction(place.parent / name, options, lambda *said: written[not said[1]](*said))
+        return made(mesh_scene(source, **options))
+    except (InvalidArgumentError, InvalidProblemError) as error:
+        raise InvalidProblemError(f"{place}: {error}") from error
+
+
+def _toml(place: Path) -> dict[str, Any]:
+    if (found := unreadable(place)) is not None:
+        raise InvalidArgumentError(f"{found}; expected a TOML file of options")
+    with place.open("rb") as file:
+        content = file.read(LARGEST_TOML + 1)
+    try:
+        options = toml_from(content)
+    except ValueError as error:
+        reason = shortened(str(error))
+        raise InvalidArgumentError(
+            f"it is not a TOML file ({reason}); expected lines such as contact = 'floor'"
+        ) from error
+    if {_PAIRS, "pairs"} <= options.keys():
+        raise InvalidArgumentError(f"{_PAIRS} and pairs are given; expected only one of them")
+    return {"pairs" if name == _PAIRS else name: value for name, value in options.items()}
+
+
+def check_keys(options: Mapping[str, Any], spelled: Callable[[str], str] = str, also: tuple[str, ...] = ()) -> None:
+    """Refuse options that `mesh_problem` does not have, and the lack of those that it must have.
+
+    ``spelled`` gives the name of an option as its user writes it, and ``also`` has names that may be meant as well.
+
+    Raises
+    ------
+    InvalidArgumentError
+        The closest name is given, or what is missing.
+    """
+    known = _defaults()
+    for name in options:
+        if name not in known:
+            close = difflib.get_close_matches(name, [*known, *also], n=1)
+            hint = f"did you mean {close[0]}?" if close else f"expected some of mesh, {', '.join(known)}"
+            raise InvalidArgumentError(f"there is no option {shown(name)}; {hint}")
+    missing = [name for name, default in known.items() if default is inspect.Parameter.empty and name not in options]
+    if not {"contact", "pairs"} & options.keys():
+        missing.append("contact")
+    if missing:
+        names = ", ".join(map(spelled, missing))
+        raise InvalidArgumentError(f"{names} {'is' if len(missing) == 1 else 'are'} missing")
