@@ -83,10 +83,13 @@ class StabilitySearch:
 
     def run(self) -> Proven:
         """What is proven."""
+        if not self.stiffness.increases:
+            # neither a motion nor a range without end can be proven
+            return Proven((), (), ((0.0, np.inf),))
         gaps = _joined(list(self._plain()))
         growing = [] if self.motions.unsure else [found for low, high in gaps for found in self._growing(low, high)]
         growing.sort(key=lambda item: -item[0].low)
-        if not growing:
+        if not growing and (self.stiffness.stiffest or self.stiffness.steepest) is not None:
             gaps = [gap for low, high in gaps for gap in self._by_weights(low, high)]
         return Proven(tuple(sorted(self._ranges, key=lambda item: item[0])), tuple(growing), tuple(_joined(gaps)))
 
@@ -202,6 +205,8 @@ class StabilitySearch:
         """About the smallest eigenvalue of the pencil (A, M), a power of two."""
         A, M = self.stiffness.A, self.stiffness.M
         diagonal, mass = A.diagonal(), M.diagonal()
+        if not np.any(mass):
+            return 1.0
         typical = float(np.median(diagonal) / max(float(np.mean(mass)), np.finfo(float).tiny))
         x = np.random.default_rng(1).normal(size=A.shape[0])
         try:
@@ -220,6 +225,8 @@ class StabilitySearch:
     def _middle(self, low: float, high: float, narrow: float) -> float | None:
         """Where to divide a range of mu; None where it is narrow."""
         if np.isinf(high):
+            if low == 0:
+                return self._first
             return _STRIDE * low if low < _STRIDE**_DECADES * self._first else None
         if low == 0:
             return high / _STRIDE if high > _LEAST * self._first else None

@@ -169,6 +169,41 @@ def test_bodies_that_nothing_connects():
     assert max(len(found.growth_rates) for found in roots.stability(mass=whole)) == 2
 
 
+def test_an_axis_without_friction():
+    """Along it the node moves freely; that says nothing of the other axis."""
+    A, rows = np.array([[2, 0.9, 0.1], [0.9, 1, 0], [0.1, 0, 1]]), np.eye(3)
+    seen = {}
+    for force in (1.5, 0.5):
+        w = np.array([0, 0.25 if force == 1.5 else 0, 0.5])
+        f = A @ w + [1, force, 0]
+        problem = ContactProblem3D(A, rows[:1], rows[1:2], rows[2:], f, friction=(1.5, 0.0))
+        for root in enumsol.enumerate_roots(problem, 0.0):
+            [active] = root.active
+            seen[str(*active)] = enumsol.stability(problem, root, mass=np.eye(3))
+    assert {name: found.verdict for name, found in seen.items()} == {
+        "open": "does not run away",
+        "stick": "does not run away",
+        "slip": "runs away",
+    }
+    assert seen["slip"].growth_rates[0] == pytest.approx(np.sqrt(0.35))
+
+
+def test_a_body_without_mass_beside_one():
+    """Nothing is said of a part without any mass."""
+    problem = gallery.chain(2)
+    roots = enumsol.enumerate_roots(problem, 5.0)
+    found = dict(
+        zip(
+            ("".join(str(s)[1] for s in root.statuses) for root in roots),
+            roots.stability(mass=np.diag([1, 1, 0, 0])),
+            strict=True,
+        )
+    )
+    verdicts = {name: item.verdict for name, item in found.items()}
+    assert (verdicts["pp"], verdicts["tt"], verdicts["lp"]) == ("does not run away", "does not run away", "runs away")
+    assert verdicts["pl"] == "undecided"
+
+
 @pytest.mark.slow
 def test_a_uniform_density_changes_no_verdict():
     problem = gallery.taper(3, 3)
@@ -198,3 +233,18 @@ def test_mass_of_few_degrees_of_freedom():
     check(problem, roots, tall, counts)
     assert not counts["undecided"]
     assert sp.issparse(problem.replace(mass=tall).mass)
+
+
+def test_mass_of_low_rank():
+    """Semidefinite on all degrees of freedom: no statement is wrong, and the search ends."""
+    counts = Counter()
+    for seed in range(4):
+        rng = np.random.default_rng([6, seed])
+        problem = planted_problem(rng, kinds=("slip",))
+        Y = rng.integers(-2, 3, (problem.n, 1)).astype(float)
+        mass = Y @ Y.T
+        for root, found in zip(roots := enumsol.enumerate_roots(problem, 0.0), roots.stability(mass=mass), strict=True):
+            counts[found.verdict] += 1
+            if found.verdict != "undecided":
+                assert (found.verdict == "runs away") == bool(of_a_root(problem, root, mass))
+    assert counts.total() >= 4
