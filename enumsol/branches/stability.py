@@ -9,9 +9,10 @@ import numpy as np
 
 from enumsol.errors import InvalidArgumentError
 from enumsol.model.problem import ContactProblem
-from enumsol.roots.stability import Stabilities, friction_over
+from enumsol.roots.stability import Stabilities
 from enumsol.search.stability import Proven, StabilitySearch
 from enumsol.support.deadlines import look
+from enumsol.trusted.motions_of_body import friction_over
 from enumsol.trusted.running_away import Growing
 
 if TYPE_CHECKING:
@@ -21,8 +22,9 @@ if TYPE_CHECKING:
 
     from enumsol.branches.elements import Arc
     from enumsol.model.problem3d import AnyProblem
-    from enumsol.roots.stability import Setting, Verdict
+    from enumsol.roots.stability import Verdict
     from enumsol.support.array_types import ArrayLike
+    from enumsol.trusted.motions_of_body import Setting
 
 #: Parts of an arc in which nothing is proven at once are halved so often, and those where a verdict changes once more.
 _HALVINGS = 6

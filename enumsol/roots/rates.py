@@ -10,7 +10,7 @@ import numpy as np
 import scipy.sparse as sp
 
 from enumsol.errors import InvalidArgumentError, TooLargeError
-from enumsol.roots.stability import Setting, Stabilities
+from enumsol.roots.stability import Stabilities, displacement
 from enumsol.support.array_arguments import vector_of
 from enumsol.support.immutable import Sealed
 from enumsol.trusted.running_away import positive, rates_in
@@ -22,6 +22,7 @@ if TYPE_CHECKING:
     from enumsol.model.problem3d import AnyProblem
     from enumsol.roots.root import Root
     from enumsol.support.array_types import ArrayLike, Floats
+    from enumsol.trusted.motions_of_body import Setting
 
 #: Nodes at their limit up to which all ways in which they may slide or stay are tried.
 _LARGEST = 14
@@ -179,7 +180,7 @@ def _way(problem: AnyProblem, load: Floats, parts: tuple[tuple[Setting, tuple[in
     forces, u, slides = np.zeros(problem.contact_rows.shape[0]), np.zeros(problem.n), []
     for setting, own, y in parts:
         forces[setting.rows] = y.mid
-        u[setting.dofs] = setting.displacement(0.0, load[setting.dofs], y.mid)
+        u[setting.dofs] = displacement(setting, 0.0, load[setting.dofs], y.mid)
         slides += [setting.limits[i] for i in own]
     lambda_t = forces[problem.p :]
     tangential = lambda_t if len(lambda_t) == problem.p else lambda_t.reshape(problem.p, -1, order="F")

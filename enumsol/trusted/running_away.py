@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, Protocol
 import numpy as np
 
 from enumsol.arithmetic.balls import TINY, UNIT, Ball, dense_eigenvalue_bound, determinant_sign, solution, upper_norm
-from enumsol.model.statuses import OPEN, SLIP_MINUS, SLIP_PLUS, STICK
+from enumsol.trusted.status_rows import OPEN, SLIP_MINUS, SLIP_PLUS, STICK
 
 if TYPE_CHECKING:
     from collections.abc import Sequence

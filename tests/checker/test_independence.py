@@ -44,6 +44,7 @@ SHARED = {
         *("as_objects", "is_positive_definite", "rational", "rational_matrix", "simplest", "to_fraction")
     },
     "condensation.data": {"Data", "EXACT_DOF_LIMIT", "ProblemData", "exactly_at"},
+    "condensation.dynamic": {"DynamicStiffness", "Pencil"},
     "condensation.enclosure": {
         *("CondensedEnclosure", "EnclosedSystem", "NotEnclosedError", "RigidRows", "enclosure_of", "moved_by_modes")
     },
@@ -65,6 +66,8 @@ SHARED = {
     "trusted.uniqueness": {*("ClosedSolution", "closed_solution", "numbers_of", "only_solution", "same_solution")},
     "trusted.at_alpha": {"VerifiedSelection", "settled_selection", "solve_selection"},
     "trusted.precise_at_alpha": {"PreciseAtAlpha"},
+    "trusted.motions_of_body": {"BodyMotions", "Setting", "friction_over"},
+    "trusted.running_away": None,
     "trusted.quadratic_forms": {"EnclosedForm", "Equations", "QuadraticForm"},
     "trusted.status_rows": None,
     "trusted.space.sector_margins": {"SlipForm"},

@@ -1,0 +1,250 @@
+"""How the parts of a body may begin to move at an equilibrium, by what its contact nodes do (theory, section 15.2).
+
+The search for growing motions and the checker of its proofs build the same motions here, from statuses that hold,
+coefficients of friction and, in 3D, bounds of the tangential forces.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from fractions import Fraction
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import scipy.sparse as sp
+from scipy.sparse.csgraph import connected_components
+
+from enumsol.arithmetic.balls import SAFE, TINY, UNIT, Ball, hull
+from enumsol.condensation.data import exactly_at
+from enumsol.condensation.dynamic import DynamicStiffness
+from enumsol.condensation.enclosure import nearest_floats
+from enumsol.errors import InvalidArgumentError
+from enumsol.model.mass import checked_mass
+from enumsol.support.arguments import alpha_value
+from enumsol.trusted.running_away import Motions, Touching
+from enumsol.trusted.status_rows import OPEN, SLIP_PLUS, STICK
+
+if TYPE_CHECKING:
+    from collections.abc import Collection, Iterator, Sequence
+
+    from enumsol.model.problem3d import AnyProblem
+    from enumsol.support.array_types import AlphaLike, ArrayLike, Floats, Integers
+
+
+@dataclass(frozen=True, eq=False)
+class Setting:
+    """A part of the body that nothing connects with others, at an equilibrium.
+
+    Attributes
+    ----------
+    stiffness : DynamicStiffness
+        Of its rows in contact.
+    motions : Motions
+    dofs : (n',) int array
+        Its degrees of freedom.
+    rows : list of int
+        Those rows among all contact rows.
+    limits : list of int
+        Contact nodes at their limit, in the order of ``motions``.
+    """
+
+    stiffness: DynamicStiffness
+    motions: Motions
+    dofs: Integers
+    rows: list[int]
+    limits: list[int]
+
+
+class BodyMotions:
+    """The parts of one body, and how they may begin to move.
+
+    Parameters
+    ----------
+    problem : ContactProblem or ContactProblem3D
+    mass : (n, n) array_like or sparse, or None
+        In place of ``problem.inertia``.
+
+    Attributes
+    ----------
+    mass : (n, n) csc_array
+    tangents : int
+        Tangents of a node: 1 in 2D, 2 in 3D.
+
+    Raises
+    ------
+    InvalidProblemError
+        The mass cannot be used.
+    InvalidArgumentError
+        There is none, or friction depends on the solution.
+    """
+
+    def __init__(self, problem: AnyProblem, mass: ArrayLike | sp.sparray | sp.spmatrix | None = None) -> None:
+        self.problem = problem
+        if getattr(problem, "depends_on_solution", False):
+            raise InvalidArgumentError("friction depends on the solution; expected constant coefficients")
+        self.mass = problem.inertia if mass is None else checked_mass(mass, problem.A, problem.modes.N)
+        A, rows = sp.csc_array(problem.A), sp.csr_array(problem.contact_rows)
+        self.tangents = rows.shape[0] // problem.p - 1
+        links = sp.csr_array(abs(A) + abs(self.mass))
+        count, self._part = connected_components(links, directed=False)
+        # a row that touches several parts connects them
+        joins = sp.csr_array((np.ones(problem.n), (np.arange(problem.n), self._part)), shape=(problem.n, count))
+        of_nodes = sum(abs(rows[k * problem.p : (k + 1) * problem.p]) for k in range(self.tangents + 1)) @ joins
+        joined = sp.csr_array(of_nodes.T @ of_nodes)
+        _, together = connected_components(joined, directed=False)
+        self._part = together[self._part]
+        first = np.array([of_nodes.indices[of_nodes.indptr[i]] for i in range(problem.p)])
+        self._node_part = together[first]
+        self._stiffness: dict[Any, DynamicStiffness] = {}
+
+    def settings(
+        self,
+        held: Sequence[Collection[int]],
+        F: list[Ball],
+        forces: Floats | None = None,
+        unsure: tuple[int, ...] = (),
+        *,
+        every: bool = False,
+    ) -> Iterator[Setting]:
+        """Parts of the body with nodes at their limit, or all.
+
+        Parameters
+        ----------
+        held : sequence of sets
+            Per node the codes of the statuses that hold; in 3D any one but open and stick means slip.
+        F : list of Balls (p,)
+            Coefficients by axis.
+        forces : (p, 2, 2) array, optional
+            In 3D: bounds of lambda_t.
+        unsure : tuple of int
+            Nodes of which bounds leave open whether they are at their limit.
+        """
+        rubs = np.any([f.mid > 0 for f in F], axis=0)
+        for part in np.unique(self._part):
+            nodes = np.flatnonzero(self._node_part == part).tolist()
+            kinds = {i: _kind(held[i], rubs[i]) for i in nodes}
+            if every or "limit" in kinds.values():
+                moves = {i: _limit(held[i], F, i, forces) for i, kind in kinds.items() if kind == "limit"}
+                yield self._setting(F, int(part), kinds, moves, unsure)
+
+    def _setting(
+        self,
+        F: list[Ball],
+        part: int,
+        kinds: dict[int, str],
+        moves: dict[int, tuple[list[Ball], Ball]],
+        unsure: tuple[int, ...],
+    ) -> Setting:
+        """A part with nodes that are open, stuck, at their limit or touch."""
+        p = self.problem.p
+        rubbing = [(k * p, i) for k in range(self.tangents + 1) for i in kinds if not k or F[k - 1].mid[i] > 0]
+        rows = [first + i for first, i in rubbing if kinds[i] != "open"]
+        place = {row: at for at, row in enumerate(rows)}
+        dofs = np.flatnonzero(self._part == part)
+        columns: list[Ball] = []
+        slopes: list[Ball] = []
+        for i, (move, sinking) in moves.items():
+            along = {place[(k + 1) * p + i]: x for k, x in enumerate(move) if (k + 1) * p + i in place}
+            columns.append(_column(len(rows), along))
+            slopes.append(_column(len(rows), along | {place[i]: -sinking}))
+        touching: list[Touching] = []
+        signed = [True] * len(moves)
+        for i in (i for i, kind in kinds.items() if kind == "touching"):
+            own = [(k + 1) * p + i for k in range(self.tangents) if (k + 1) * p + i in place]
+            start = len(columns)
+            columns.append(_column(len(rows), {place[i]: Ball.exact(np.array(-1.0))}))
+            columns += [_column(len(rows), {place[row]: Ball.exact(np.array(1.0))}) for row in own]
+            signed += [True, *(False for _ in own)]
+            # along axes with friction
+            smaller = min((f[i] for f in F), key=lambda f: float(f.mid) or np.inf)
+            touching.append(Touching(start, tuple(range(start + 1, start + 1 + len(own))), smaller))
+        motions = Motions(
+            _stacked(columns, len(rows)),
+            _stacked(slopes, len(rows)),
+            np.array(signed, dtype=bool),
+            tuple(touching),
+            tuple(k for k, i in enumerate(moves) if i in unsure),
+        )
+        return Setting(self._stiffness_of(part, dofs, rows), motions, dofs, rows, list(moves))
+
+    def _stiffness_of(self, part: int, dofs: Integers, rows: list[int]) -> DynamicStiffness:
+        """Stiffness of some rows of a part."""
+        key, problem = (part, tuple(rows)), self.problem
+        if key not in self._stiffness:
+            modes = springs = None
+            if not problem.held:
+                N = problem.modes.N[dofs]
+                modes = N[:, np.any(N != 0, axis=0)]
+                springs = sp.csc_array(problem.modes.springs())[dofs][:, dofs]
+            A, M = (sp.csc_array(sp.csr_array(matrix)[dofs][:, dofs]) for matrix in (problem.A, self.mass))
+            B = sp.csr_array(sp.csr_array(problem.contact_rows)[rows][:, dofs])
+            self._stiffness[key] = DynamicStiffness(A, M, B, modes, springs)
+        return self._stiffness[key]
+
+
+def friction_over(problem: AnyProblem, low: AlphaLike, high: AlphaLike) -> list[Ball]:
+    """F along every axis for all alpha between two, as balls (p,)."""
+    first, slope = (np.asarray(part).reshape(problem.p, -1) for part in problem.affine_friction)
+    balls = []
+    for k in range(first.shape[1]):
+        ends = []
+        for alpha in (low, high):
+            F, inexact = nearest_floats(exactly_at(Fraction(alpha_value(alpha)), first[:, k], slope[:, k]))
+            ends.append(Ball(F, np.where(inexact, 2 * UNIT * F + TINY, 0.0)))
+        balls.append(hull(ends))
+    return balls
+
+
+def _kind(held: Collection[int], friction: bool) -> str:
+    """What a node may do: stay open or stuck, slide at its limit, or leave where it touches without force."""
+    codes = set(held)
+    if codes == {OPEN}:
+        return "open"
+    if OPEN in codes:
+        return "touching"
+    return "limit" if friction and codes != {STICK} else "stuck"
+
+
+def _limit(held: Collection[int], F: list[Ball], i: int, forces: Floats | None) -> tuple[list[Ball], Ball]:
+    """Tangential move of a node at its limit, by axis, and by how much T_i sinks meanwhile (theory, (15.3))."""
+    if len(F) == 1:
+        sign = 1.0 if SLIP_PLUS in held else -1.0
+        return [Ball.exact(np.array(sign))], F[0][i]
+    assert forces is not None
+    inverse = [_inverse(f[i]) for f in F]
+    force = [Ball(0.5 * (low + high), 0.5 * (high - low) * SAFE + TINY) for low, high in forces[i]]
+    shares = [x * y for x, y in zip(force, inverse, strict=True)]
+    length = float(np.hypot(*(x.mid for x in shares))) or TINY
+    # |v / |v| - m / |m|| <= 2 |v - m| / |m|
+    off = 2.0 * float(np.hypot(*(x.rad for x in shares))) / length * SAFE + 8 * UNIT
+    typical = max(float(f.mid[i]) for f in F)
+    moves = [
+        Ball(np.array(typical * float(x.mid) / length), np.array(typical * off * SAFE)) * y
+        for x, y in zip(shares, inverse, strict=True)
+    ]
+    return moves, Ball.exact(np.array(typical))
+
+
+def _inverse(F: Ball) -> Ball:
+    """1 / F; of no friction at all zero, since no force is along that axis."""
+    mid = float(F.mid)
+    return (
+        Ball.exact(np.array(0.0))
+        if mid == 0
+        else Ball(np.array(1 / mid), np.array((2 * float(F.rad) / mid + 2 * UNIT) / mid))
+    )
+
+
+def _stacked(columns: list[Ball], size: int) -> Ball:
+    """Columns beside each other, (size, k)."""
+    if not columns:
+        return Ball.exact(np.zeros((size, 0)))
+    return Ball(np.stack([c.mid for c in columns], axis=1), np.stack([c.rad for c in columns], axis=1))
+
+
+def _column(size: int, entries: dict[int, Ball]) -> Ball:
+    """A column with some entries that are not zero."""
+    column = Ball.exact(np.zeros(size))
+    for at, value in entries.items():
+        column[at] = value
+    return column
