@@ -25,6 +25,7 @@ if TYPE_CHECKING:
     import pandas as pd
 
     from enumsol.branches.elements import Arc, Branch, Component, Vertex
+    from enumsol.branches.stability import Span
     from enumsol.condensation.exact import ExactCondensed
     from enumsol.proof.proof_file import Proof
     from enumsol.search.subintervals import SearchedPiece
@@ -183,6 +184,17 @@ class GraphData(Immutable):
     def branch_of(self) -> Mapping[int, int]:
         """Number of the branch of every arc, by the arc's number."""
         return MappingProxyType({arc.number: branch.number for branch in self.branches for arc in branch.arcs})
+
+    @cached_property
+    def _found(self) -> dict[str, list[tuple[Span, ...]]]:
+        """What is found about the arcs later, arc by arc; it may be cut short."""
+        return {}
+
+    @property
+    def verdicts(self) -> tuple[tuple[Span, ...], ...] | None:
+        """What `BranchGraph.stability` found last, or None where it was not asked, or cut short."""
+        found = self._found.get("verdicts")
+        return None if found is None or len(found) < len(self.arcs) else tuple(found)
 
     def inside(self, alpha: AlphaLike) -> Fraction:
         """An alpha of the interval."""

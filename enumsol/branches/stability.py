@@ -79,6 +79,7 @@ class ArcStabilities:
 
     def spans(self, arc: Arc) -> tuple[Span, ...]:
         """Verdicts along an arc, from its lower end to its upper one."""
+        look()
         if arc.grazing or arc.dimension:
             return (Span(arc.lo, arc.hi, "undecided"),)
         self._hints = []
