@@ -309,7 +309,10 @@ class BranchGraph(GraphData):
         return load_graph(cls, file)
 
     def summary(self) -> dict[str, Any]:
-        """Counts and answers as plain values, for JSON; what is not known is None."""
+        """Counts and answers as plain values, for JSON; what is not known is None.
+
+        Once `stability` was asked for, ``stability`` has its ranges of alpha, arc by arc.
+        """
         uniqueness, steps = self.claims.uniqueness(), self._steps
         return {
             "interval": list(self.interval),
@@ -336,5 +339,6 @@ class BranchGraph(GraphData):
                 "at": list(steps.at),
                 "between": list(steps.between),
             },
+            **({} if self.verdicts is None else {"stability": [list(map(asdict, spans)) for spans in self.verdicts]}),
             "stats": asdict(self.stats),
         }

@@ -15,7 +15,7 @@ from enumsol.support.deadlines import look
 from enumsol.trusted.running_away import Growing
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Sequence
+    from collections.abc import Iterator
 
     import scipy.sparse as sp
 
@@ -166,8 +166,3 @@ def _joined(spans: Iterator[Span]) -> list[Span]:
         else:
             joined.append(span)
     return joined
-
-
-def verdict_of(spans: Sequence[Span]) -> str:
-    """The verdicts along an arc in words: one, or several in turn."""
-    return ", then ".join(dict.fromkeys(span.verdict for span in spans))
