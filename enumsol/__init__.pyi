@@ -25,6 +25,7 @@ from ._version import __version__ as __version__
 from .auditing import audit as audit, follow_all as follow_all
 from .branches import (
     BranchGraph as BranchGraph,
+    Span as Span,
     branch_graph as branch_graph,
     link_samples as link_samples,
     multiplicity_table as multiplicity_table,

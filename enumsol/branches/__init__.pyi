@@ -10,3 +10,4 @@ from .samples import (
     link_samples as link_samples,
     multiplicity_table as multiplicity_table,
 )
+from .stability import Span as Span

@@ -20,8 +20,11 @@ from enumsol.support.arguments import alpha_value
 if TYPE_CHECKING:
     from pathlib import Path
 
+    import scipy.sparse as sp
+
+    from enumsol.branches.stability import Span
     from enumsol.roots.root import Root, RootFamily
-    from enumsol.support.array_types import AlphaLike
+    from enumsol.support.array_types import AlphaLike, ArrayLike
 
 
 class BranchGraph(GraphData):
@@ -228,6 +231,46 @@ class BranchGraph(GraphData):
         """
         return uniqueness_bound(self.problem, self.interval) if self.problem.held else None
 
+    def stability(self, *, mass: ArrayLike | sp.sparray | sp.spmatrix | None = None) -> tuple[tuple[Span, ...], ...]:
+        """Which arcs run away: one tuple of ranges of alpha an arc, in their order (see `enumsol.stability`).
+
+        Where friction does not depend on alpha, an arc has one verdict. Sheets and grazing arcs are undecided. Printed
+        graphs, tables and figures show the verdicts from then on, for the last mass that was asked for. A call that is
+        cut short loses nothing: the next one goes on after the last arc that was done.
+
+        Parameters
+        ----------
+        mass : (n, n) array_like or sparse, optional
+            By default that of the problem.
+
+        Returns
+        -------
+        tuple of tuples of Span
+
+        Raises
+        ------
+        InvalidArgumentError
+            The graph is one in 3D, where ``roots_at(alpha).stability()`` serves; otherwise as `enumsol.stability`.
+        InvalidProblemError
+            The mass cannot be used.
+
+        Examples
+        --------
+        >>> import enumsol
+        >>> graph = enumsol.branch_graph(enumsol.gallery.one_node_triangle(), (0, 3))
+        >>> [[span.verdict for span in spans] for spans in graph.stability()]
+        [['does not run away'], ['does not run away'], ['runs away']]
+        """
+        from enumsol.branches.stability import ArcStabilities  # sparse graphs and solvers come with it
+
+        if mass is not None or self.verdicts is None:
+            asked = ArcStabilities(self.problem, mass)
+            found = self._found.setdefault("verdicts", []) if mass is None else []
+            for arc in self.arcs[len(found) :]:
+                found.append(asked.spans(arc))
+            self._found["verdicts"] = found
+        return self.verdicts or ()
+
     def starting_point(self, branch: Branch) -> Root | None:
         """A regular root in the middle of the branch's longest arc; None when there is none at any float alpha."""
         for arc in sorted(branch.arcs, key=lambda arc: -arc.length):
@@ -266,7 +309,10 @@ class BranchGraph(GraphData):
         return load_graph(cls, file)
 
     def summary(self) -> dict[str, Any]:
-        """Counts and answers as plain values, for JSON; what is not known is None."""
+        """Counts and answers as plain values, for JSON; what is not known is None.
+
+        Once `stability` was asked for, ``stability`` has its ranges of alpha, arc by arc.
+        """
         uniqueness, steps = self.claims.uniqueness(), self._steps
         return {
             "interval": list(self.interval),
@@ -293,5 +339,6 @@ class BranchGraph(GraphData):
                 "at": list(steps.at),
                 "between": list(steps.between),
             },
+            **({} if self.verdicts is None else {"stability": [list(map(asdict, spans)) for spans in self.verdicts]}),
             "stats": asdict(self.stats),
         }

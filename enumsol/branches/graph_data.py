@@ -6,6 +6,7 @@ from collections import Counter
 from dataclasses import dataclass
 from fractions import Fraction
 from functools import cached_property
+from itertools import groupby
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
 
@@ -14,17 +15,18 @@ from enumsol.arithmetic.rationals import rational
 from enumsol.branches.claims import Claims, Standing, ranges_text
 from enumsol.branches.elements import VertexKind, make_branches, make_components, multigraph, shape_of
 from enumsol.errors import InvalidArgumentError
-from enumsol.roots.root_set import by_axis
+from enumsol.roots.root_set import ABOUT_STABILITY, by_axis
 from enumsol.support.arguments import alpha_value
 from enumsol.support.immutable import Immutable, Listed
 from enumsol.support.messages import counted, html_lines, html_table
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Mapping
+    from collections.abc import Callable, Mapping, Sequence
 
     import pandas as pd
 
     from enumsol.branches.elements import Arc, Branch, Component, Vertex
+    from enumsol.branches.stability import Span
     from enumsol.condensation.exact import ExactCondensed
     from enumsol.proof.proof_file import Proof
     from enumsol.search.subintervals import SearchedPiece
@@ -184,6 +186,17 @@ class GraphData(Immutable):
         """Number of the branch of every arc, by the arc's number."""
         return MappingProxyType({arc.number: branch.number for branch in self.branches for arc in branch.arcs})
 
+    @cached_property
+    def _found(self) -> dict[str, list[tuple[Span, ...]]]:
+        """What is found about the arcs later, arc by arc; it may be cut short."""
+        return {}
+
+    @property
+    def verdicts(self) -> tuple[tuple[Span, ...], ...] | None:
+        """What `BranchGraph.stability` found last, or None where it was not asked, or cut short."""
+        found = self._found.get("verdicts")
+        return None if found is None or len(found) < len(self.arcs) else tuple(found)
+
     def inside(self, alpha: AlphaLike) -> Fraction:
         """An alpha of the interval."""
         value, (low, high) = Fraction(alpha_value(alpha)), self.exact_interval
@@ -234,15 +247,41 @@ class GraphData(Immutable):
         return tuple(found)
 
 
+#: Verdicts of stability, in the order of legends.
+VERDICTS = ("does not run away", "runs away", "undecided")
 #: Branches that are printed one by one.
 _PRINTED_BRANCHES = 20
 
 
+def verdict_words(data: GraphData) -> tuple[str, ...]:
+    """The verdicts along every arc, one or several in turn; none where they are not known."""
+    return tuple(map(_in_turn, data.verdicts or ()))
+
+
+def _in_turn(spans: Sequence[Span]) -> str:
+    """The verdicts along an arc; an undecided range in which one changes to the other is not told."""
+    decided = [verdict for verdict, _ in groupby(span.verdict for span in spans if span.verdict != VERDICTS[2])]
+    if not decided:
+        return VERDICTS[2]
+    left = sum(span.verdict == VERDICTS[2] for span in spans) > len(decided) - 1
+    return ", then ".join(decided) + (", partly undecided" if left else "")
+
+
+def branch_stability(data: GraphData, branch: Branch) -> str:
+    """The verdicts along the arcs of a branch, and of how many arcs where they differ."""
+    words = verdict_words(data)
+    kinds = Counter(words[arc.number] for arc in branch.arcs)
+    if len(kinds) == 1:
+        return next(iter(kinds))
+    return "; ".join(f"{verdict} ({counted(count, 'arc')})" for verdict, count in sorted(kinds.items()))
+
+
 def graph_text(data: GraphData) -> str:
     """Counts, a line a branch, and whether the graph is complete."""
-    lines = [*_heading(data), *map(_branch_line, data.branches[:_PRINTED_BRANCHES])]
+    lines = [*_heading(data), *(_branch_line(data, branch) for branch in data.branches[:_PRINTED_BRANCHES])]
     if len(data.branches) > _PRINTED_BRANCHES:
         lines.append(f"  ... {len(data.branches) - _PRINTED_BRANCHES} more branches")
+    lines += [f"  {ABOUT_STABILITY}"] if data.verdicts is not None else []
     lines += _left_open(data)
     return "\n".join([*lines, data.closing_line])
 
@@ -256,12 +295,15 @@ def graph_html(data: GraphData) -> str:
             len(branch.arcs),
             *(f"{end:.6g}" for end in branch.interval),
             ", ".join(f"{v.alpha:.6g}" for v in branch.folds),
+            *(() if data.verdicts is None else (branch_stability(data, branch),)),
         )
         for branch in data.branches[:_PRINTED_BRANCHES]
     ]
     more = len(data.branches) - _PRINTED_BRANCHES
-    table = html_table(("branch", "shape", "arcs", "alpha from", "to", "folds at"), rows) if rows else ""
+    heads = ("branch", "shape", "arcs", "alpha from", "to", "folds at")
+    table = html_table(heads if data.verdicts is None else (*heads, "stability"), rows) if rows else ""
     closing = [*([f"... {more} more branches"] if more > 0 else []), *_left_open(data), data.closing_line]
+    closing[:0] = [ABOUT_STABILITY] if data.verdicts is not None else []
     return html_lines(_heading(data)) + table + html_lines(closing)
 
 
@@ -281,20 +323,26 @@ def _left_open(data: GraphData) -> list[str]:
     return [f"  left open: {ranges_text(data.open_ranges)}"] if data.claims.partly else []
 
 
-def _branch_line(branch: Branch) -> str:
+def _branch_line(data: GraphData, branch: Branch) -> str:
     lo, hi = branch.interval
     folds = ", ".join(f"{v.alpha:.6g}" for v in branch.folds)
     width = f", length {hi - lo:.3g}" if f"{lo:.6g}" == f"{hi:.6g}" else ""
     arcs = counted(len(branch.arcs), "arc")
-    return f"  branch {branch.number}: {shape_of(branch)}, {arcs}, alpha in [{lo:.6g}, {hi:.6g}]{width}" + (
-        f", folds at {folds}" if folds else ""
+    return (
+        f"  branch {branch.number}: {shape_of(branch)}, {arcs}, alpha in [{lo:.6g}, {hi:.6g}]{width}"
+        + (f", folds at {folds}" if folds else "")
+        + ("" if data.verdicts is None else f"\n    stability: {branch_stability(data, branch)}")
     )
 
 
 def arcs_frame(data: GraphData) -> pd.DataFrame:
-    """Table with a row for each arc: branch, component, ends and their kinds, index, dimension and statuses by node."""
+    """Table with a row for each arc: branch, component, ends and their kinds, index, dimension and statuses by node.
+
+    Once ``stability`` was asked for, a column has the verdict, or several in the order of alpha.
+    """
     import pandas as pd
 
+    words = verdict_words(data)
     place = {arc.number: c.number for c in data.components for arc in c.arcs}
     rows = [
         {
@@ -308,6 +356,7 @@ def arcs_frame(data: GraphData) -> pd.DataFrame:
             "kind_from": data.vertices[arc.tail].kind.value,
             "kind_to": data.vertices[arc.head].kind.value,
             "index": arc.index,
+            **({"stability": words[arc.number]} if words else {}),
             "dimension": arc.dimension,
             "grazing": arc.grazing,
             "statuses": " ".join(s.value for s in arc.statuses),

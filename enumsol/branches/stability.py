@@ -16,7 +16,7 @@ from enumsol.trusted.motions_of_body import friction_over
 from enumsol.trusted.running_away import Growing
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Sequence
+    from collections.abc import Iterator
 
     import scipy.sparse as sp
 
@@ -81,6 +81,7 @@ class ArcStabilities:
 
     def spans(self, arc: Arc) -> tuple[Span, ...]:
         """Verdicts along an arc, from its lower end to its upper one."""
+        look()
         if arc.grazing or arc.dimension:
             return (Span(arc.lo, arc.hi, "undecided"),)
         self._hints = []
@@ -167,8 +168,3 @@ def _joined(spans: Iterator[Span]) -> list[Span]:
         else:
             joined.append(span)
     return joined
-
-
-def verdict_of(spans: Sequence[Span]) -> str:
-    """The verdicts along an arc in words: one, or several in turn."""
-    return ", then ".join(dict.fromkeys(span.verdict for span in spans))

@@ -12,6 +12,7 @@ from enumsol.branches.claims import ranges_text
 from enumsol.branches.elements import Arc, Vertex, VertexKind, shape_of
 from enumsol.branches.figures.curves import QUANTITIES, Curve, curves, side_by_side
 from enumsol.branches.figures.panels import colour_of, family_states
+from enumsol.branches.graph_data import branch_stability
 from enumsol.model.problem import ContactProblem
 from enumsol.report.body import body_record
 from enumsol.report.parts import (
@@ -28,6 +29,7 @@ from enumsol.report.parts import (
     table_text,
     with_unit,
 )
+from enumsol.roots.root_set import ABOUT_STABILITY
 from enumsol.support.messages import counted
 
 if TYPE_CHECKING:
@@ -53,7 +55,10 @@ def graph_page(graph: BranchGraph, heading: Heading) -> str:
         incomplete if graph.reasons else "",
         graph.reasons,
         _facts(graph, heading.units),
-        graph.claims.sentences(graph.uniqueness_bound),
+        [
+            *graph.claims.sentences(graph.uniqueness_bound),
+            *([] if graph.verdicts is None else [f"{ABOUT_STABILITY[0].upper()}{ABOUT_STABILITY[1:]}."]),
+        ],
         _certified(graph),
         graph.problem.fingerprint,
         proof_commands("graph", "--from A --to B", "; the proof's first record holds the same fingerprint."),
@@ -104,10 +109,12 @@ def _branches(graph: BranchGraph) -> str:
         indices = ", ".join(sorted({"?" if arc.index is None else f"{arc.index:+d}" for arc in branch.arcs}))
         shape = "sheet (a continuum over an interval)" if branch.sheet else shape_of(branch)
         cells = (str(branch.number), f"{lo:.8g}", f"{hi:.8g}", shape, str(len(branch.arcs)), indices, folds)
-        rows.append((f' data-branch="{branch.number}" tabindex="0"', cells))
+        more = () if graph.verdicts is None else (branch_stability(graph, branch),)
+        rows.append((f' data-branch="{branch.number}" tabindex="0"', (*cells, *more)))
     if not rows:
         return f"<p>None{'' if graph.complete else ' was found'}.</p>"
-    return table_text("All branches", ("branch", "alpha from", "to", "shape", "arcs", "indices", "folds at"), rows)
+    heads = ("branch", "alpha from", "to", "shape", "arcs", "indices", "folds at")
+    return table_text("All branches", heads if graph.verdicts is None else (*heads, "stability"), rows)
 
 
 def _vertices(graph: BranchGraph) -> str:
@@ -189,7 +196,7 @@ def report_content(graph: BranchGraph, scene: Scene | None = None) -> dict[str, 
         "tangents": 2 if _in_space(graph) else 1,
         "quantities": [item._asdict() for item in QUANTITIES.values()],
         "tolerance": tolerance,
-        "arcs": [_arc(arc, graph.branch_of[arc.number], drawn.get(arc.number)) for arc in graph.arcs],
+        "arcs": [_arc(arc, graph, drawn.get(arc.number)) for arc in graph.arcs],
         "branches": [
             {"number": branch.number, "colour": colour_of(branch.number), "arcs": [arc.number for arc in branch.arcs]}
             for branch in graph.branches
@@ -251,10 +258,10 @@ def _sampled(graph: BranchGraph) -> tuple[dict[int, Curve], float]:
         tolerance *= 2
 
 
-def _arc(arc: Arc, branch: int, curve: Curve | None) -> dict[str, Any]:
-    record = {
+def _arc(arc: Arc, graph: BranchGraph, curve: Curve | None) -> dict[str, Any]:
+    record: dict[str, Any] = {
         "number": arc.number,
-        "branch": branch,
+        "branch": graph.branch_of[arc.number],
         "tail": arc.tail,
         "head": arc.head,
         "index": arc.index,
@@ -264,6 +271,8 @@ def _arc(arc: Arc, branch: int, curve: Curve | None) -> dict[str, Any]:
         "lo": arc.lo,
         "hi": arc.hi,
     }
+    if graph.verdicts is not None:
+        record["spans"] = [[span.low, span.high, span.verdict] for span in graph.verdicts[arc.number]]
     if curve is not None:
         record |= {"a": curve.alphas.tolist(), "f": rounded_list(curve.forces), "w": rounded_list(curve.moves)}
     return record

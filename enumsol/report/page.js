@@ -43,15 +43,32 @@ function axisName() {
 
 // -- the diagram --------------------------------------------------------------------------------------------------
 
-function arcTrace(arc) {
+const VERDICT_DASH = { "does not run away": "solid", "runs away": "dash", undecided: "dot" };
+const indexDash = (arc) => (arc.index === 1 ? "solid" : arc.index === -1 ? "dash" : "dot");
+
+// an arc in pieces, each with one verdict, where verdicts are known and no node is shown
+function arcTraces(arc) {
   const values = arc.a.map((_, k) => valueOf(arc.f[k], arc.w[k]));
-  const dash = state.quantity.by_node
-    ? STATUS_DASH[status(arc.statuses, state.node)]
-    : arc.index === 1 ? "solid" : arc.index === -1 ? "dash" : "dot";
+  if (state.quantity.by_node) return [arcTrace(arc, arc.a, values, STATUS_DASH[status(arc.statuses, state.node)], "")];
+  if (!arc.spans) return [arcTrace(arc, arc.a, values, indexDash(arc), "")];
+  if (arc.spans.length === 1) return [arcTrace(arc, arc.a, values, VERDICT_DASH[arc.spans[0][2]], `, ${arc.spans[0][2]}`)];
+  const at = (x) => {
+    const k = Math.max(1, arc.a.findIndex((a) => a >= x)), low = arc.a[k - 1], width = arc.a[k] - low;
+    return values[k - 1] + (width > 0 ? (x - low) / width : 0) * (values[k] - values[k - 1]);
+  };
+  return arc.spans.map(([from, to, verdict]) => {
+    const low = Math.max(from, arc.a[0]), high = Math.min(to, arc.a[arc.a.length - 1]);
+    const inside = arc.a.map((_, k) => k).filter((k) => low < arc.a[k] && arc.a[k] < high);
+    const x = [low, ...inside.map((k) => arc.a[k]), high], y = [at(low), ...inside.map((k) => values[k]), at(high)];
+    return arcTrace(arc, x, y, VERDICT_DASH[verdict], `, ${verdict}`);
+  });
+}
+
+function arcTrace(arc, alphas, values, dash, verdict) {
   const chosen = state.branch === null || state.branch === arc.branch;
-  const head = `branch ${arc.branch}, arc ${arc.number}, index ${signed(arc.index)}`;
+  const head = `branch ${arc.branch}, arc ${arc.number}, index ${signed(arc.index)}${verdict}`;
   return {
-    x: arc.a, y: values, customdata: values, mode: "lines", type: "scatter", meta: arc.number, showlegend: false,
+    x: alphas, y: values, customdata: values, mode: "lines", type: "scatter", meta: arc.number, showlegend: false,
     line: { color: onPage(branches.get(arc.branch).colour), dash, width: chosen && state.branch !== null ? 3 : 2 },
     opacity: chosen ? 1 : 0.2,
     hovertemplate: `${head}<br>alpha %{x:.8g}<br>${axisName()} %{customdata:.6g}<br>${runs(arc.statuses)}<extra></extra>`,
@@ -120,7 +137,7 @@ const cursor = () => ({
 const shapes = () => [...sheetShapes(), ...openShapes(), cursor()];
 
 function drawDiagram() {
-  const traces = [...data.arcs.filter((arc) => arc.a).map(arcTrace), ...vertexTraces(), ...stepTraces()];
+  const traces = [...data.arcs.filter((arc) => arc.a).flatMap(arcTraces), ...vertexTraces(), ...stepTraces()];
   const grid = { gridcolor: ink("grid"), linecolor: ink("line"), zeroline: false, automargin: true, exponentformat: "power" };
   const layout = {
     ...paperSize(690, 400), margin: { l: 50, r: 12, t: 8, b: 40 }, hovermode: "closest", showlegend: true, dragmode: "zoom", font: { size: 12, color: ink("fg") }, paper_bgcolor: "rgba(0,0,0,0)", modebar: { bgcolor: "rgba(0,0,0,0)", color: ink("dim"), activecolor: ink("fg") },
@@ -168,8 +185,10 @@ function drawKey(beside = false) {
   const dashes = { solid: "", dash: "7 4", dashdot: "7 3 2 3", dot: "2 3" };
   const used = state.quantity.by_node
     ? Object.entries(STATUS_DASH).filter(([name]) => data.arcs.some((arc) => status(arc.statuses, state.node) === name))
-    : [["index +1", "solid"], ["index \u22121", "dash"], ["other index", "dot"]].filter(([, dash]) =>
-      data.arcs.some((arc) => (arc.index === 1 ? "solid" : arc.index === -1 ? "dash" : "dot") === dash));
+    : data.arcs.some((arc) => arc.spans)
+      ? Object.entries(VERDICT_DASH).filter(([name]) => data.arcs.some((arc) => arc.a && arc.spans.some((span) => span[2] === name)))
+      : [["index +1", "solid"], ["index \u22121", "dash"], ["other index", "dot"]].filter(([, dash]) =>
+        data.arcs.some((arc) => indexDash(arc) === dash));
   const entries = used.map(([name, dash]) => {
     const line = svg("line", { x1: 0, y1: 5, x2: 34, y2: 5, stroke: "var(--ink)", "stroke-width": 2, "stroke-dasharray": dashes[dash] });
     return element("span", {}, svg("svg", { width: 34, height: 10 }, line), name);
@@ -195,13 +214,15 @@ function selectBranch(number) {
   drawDiagram();
   const place = byId("arcs");
   if (number === null) { place.replaceChildren(); return; }
+  const told = data.arcs.some((arc) => arc.spans);
   const rows = branches.get(number).arcs.map((k) => {
     const arc = arcs.get(k), kind = (v) => data.vertices[v].kind;
-    return [arc.number, short(arc.lo), short(arc.hi), kind(arc.tail), kind(arc.head), signed(arc.index), runs(arc.statuses)];
+    const verdicts = told ? [arc.spans.map((span) => span[2]).join(", then ")] : [];
+    return [arc.number, short(arc.lo), short(arc.hi), kind(arc.tail), kind(arc.head), signed(arc.index), ...verdicts, runs(arc.statuses)];
   });
   place.replaceChildren(
     element("h3", {}, `Branch ${number}: ${rows.length} ${rows.length === 1 ? "arc" : "arcs"}`),
-    table(`Arcs of branch ${number}`, ["arc", "alpha from", "to", "begins", "ends", "index", "statuses, node by node"], rows),
+    table(`Arcs of branch ${number}`, ["arc", "alpha from", "to", "begins", "ends", "index", ...(told ? ["stability"] : []), "statuses, node by node"], rows),
   );
 }
 

@@ -10,7 +10,7 @@ const drawCards = () => showCards(data.roots, scalesOf(data.roots, data.alpha));
 function startRoots() {
   byId("bodies").hidden = data.roots.length === 0;
   data.roots.forEach((item, k) => {
-    const kind = `index ${signed(item.index)}, ${item.regular ? "regular" : "not regular"}, margin ${short(item.margin)}`;
+    const kind = `index ${signed(item.index)}, ${item.regular ? "regular" : "not regular"}, margin ${short(item.margin)}${item.stability ? `, ${item.stability}` : ""}`;
     Object.assign(item, { key: k, id: `root-${k}`, name: `Root ${k}`, words: kind });
   });
   pageButtons(drawCards);

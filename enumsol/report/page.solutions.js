@@ -8,6 +8,11 @@ function between(arc, alpha) {
   return { f: mix(arc.f), w: mix(arc.w) };
 }
 
+function verdictAt(arc, alpha) {
+  const span = (arc.spans || []).find(([low, high]) => low <= alpha && alpha <= high);
+  return span ? `, ${span[2]}` : "";
+}
+
 function solutionsAt(alpha) {
   const found = [];
   for (const arc of data.arcs) {
@@ -16,7 +21,7 @@ function solutionsAt(alpha) {
     if (!(low < alpha && alpha < high)) continue;
     const name = `branch ${arc.branch}`, colour = onPage(branches.get(arc.branch).colour);
     if (arc.dimension > 0) found.push({ name, colour, words: `a sheet: a continuum of dimension ${arc.dimension}` });
-    else found.push({ name, key: `arc ${arc.number}`, colour, words: `arc ${arc.number}, index ${signed(arc.index)}`, statuses: arc.statuses, several: [], ...between(arc, alpha) });
+    else found.push({ name, key: `arc ${arc.number}`, colour, words: `arc ${arc.number}, index ${signed(arc.index)}${verdictAt(arc, alpha)}`, statuses: arc.statuses, several: [], ...between(arc, alpha) });
   }
   for (const v of data.vertices) {
     if (v.alpha !== alpha) continue;

@@ -25,6 +25,7 @@ from enumsol.report.parts import (
     with_unit,
 )
 from enumsol.roots.root import summary
+from enumsol.roots.root_set import ABOUT_STABILITY
 from enumsol.support.messages import counted, found_of
 
 if TYPE_CHECKING:
@@ -89,6 +90,8 @@ def _answers(found: RootSet) -> list[str]:
     total = found.index_sum
     note = "" if found.adds_up else " (not +1: something is missing or wrong)"
     lines.append(f"Sum of the indices: {'unknown' if total is None else f'{total:+d}'}{note}.")
+    if found.verdicts is not None:
+        lines.append(f"{ABOUT_STABILITY[0].upper()}{ABOUT_STABILITY[1:]}.")
     return lines + [f"Note: {line}." for line in found.notes]
 
 
@@ -113,9 +116,12 @@ def _root_facts(found: RootSet, units: tuple[str, str] | None) -> list[tuple[str
 def _root_table(found: RootSet) -> str:
     if not len(found):
         return "<p>No isolated solution was found.</p>"
+    verdicts = found.verdicts
+    stability: _Columns = {} if verdicts is None else {"stability": lambda k, _: verdicts[k].verdict}
     columns: _Columns = {
         "root": lambda k, _: str(k),
         "index": lambda _, root: _signed(root.index),
+        **stability,
         "regular": lambda _, root: "yes" if root.regular else "no",
         "margin": lambda _, root: f"{root.margin:.2e}",
         "max lambda_n": lambda _, root: f"{np.max(root.lambda_n):.6g}",
@@ -202,12 +208,13 @@ def roots_content(found: RootSet, scene: Scene | None = None) -> dict[str, Any]:
     listed = found[: max(1, _MOST_VALUES // (8 * p))]
     pictures, bodies = _pictures(listed, scene) if listed else (_picture(None, ""), [])
     bodies += [{}] * (len(listed) - len(bodies))
+    verdicts = [{"stability": one.verdict} for one in found.verdicts or ()] or [{}] * len(listed)
     return {
         "nodes": [str(label) for label in found.node_ids],
         "statuses": STATUS_NAMES,
         "tangents": listed[0].lambda_t[:1].size if listed else 1,
         "all": len(found),
-        "roots": [_record(root) | bodies[k] for k, root in enumerate(listed)],
+        "roots": [_record(root) | verdicts[k] | bodies[k] for k, root in enumerate(listed)],
         **pictures,
     }
 

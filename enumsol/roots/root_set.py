@@ -36,9 +36,8 @@ _EXPLAINED = (
     "index: the sign of a determinant; regular: no node is between two statuses",
     "margin: distance to the next change of status, relative to the largest values",
 )
-_OF_STABILITY = (
-    "stability: whether the body can leave it along a straight line, growing (proven where it is decided)",
-)
+#: Explains the column.
+ABOUT_STABILITY = "stability: whether the body can leave it along a straight line, growing (proven where it is decided)"
 
 #: Rotations above this are not small [degrees]: their cosine differs from one by 1.5 percent.
 LARGEST_TURN = 10.0
@@ -505,7 +504,7 @@ class RootSet(Sequence[Root], Immutable):
         return "\n".join([self._heading(), *table, *self._explained(), *self._notes()])
 
     def _explained(self) -> tuple[str, ...]:
-        more = _OF_STABILITY if self.verdicts is not None else ()
+        more = [ABOUT_STABILITY] if self.verdicts is not None else []
         return (*_EXPLAINED, *more) if len(self) else ()
 
     def _repr_html_(self) -> str:

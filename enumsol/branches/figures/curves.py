@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from itertools import pairwise
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
@@ -125,6 +126,18 @@ class _Polygon:
         length = np.hypot(run, rise)
         off = np.abs(run * up - rise * across)
         return np.asarray(np.max(np.divide(off, length, out=np.hypot(across, up), where=length > 0), axis=1))
+
+
+def cut_at(curve: Curve, column: int, ends: Sequence[float]) -> list[tuple[Floats, Floats]]:
+    """Alphas and values of one column, (k,) each, in the parts of a curve between neighbouring ``ends``, in order."""
+    alphas, values = curve.alphas, curve.values[:, column]
+    if len(ends) == 2:
+        return [(alphas, values)]
+    parts = []
+    for low, high in pairwise(np.clip(ends, alphas[0], alphas[-1]).tolist()):
+        at = np.concatenate([[low], alphas[(low < alphas) & (alphas < high)], [high]])
+        parts.append((at, np.interp(at, alphas, values)))
+    return parts
 
 
 class CurvePlace(NamedTuple):

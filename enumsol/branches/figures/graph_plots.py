@@ -8,11 +8,12 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from enumsol.branches.figures.curves import Curve, Quantity, curves, quantity_of, side_by_side, state_columns
+from enumsol.branches.figures.curves import Curve, Quantity, curves, cut_at, quantity_of, side_by_side, state_columns
 from enumsol.branches.figures.panels import (
     GREY,
     MARKERS,
     STATUS_STYLES,
+    VERDICT_STYLES,
     Panel,
     colour_of,
     draw_numbers,
@@ -22,6 +23,7 @@ from enumsol.branches.figures.panels import (
     family_range,
     handles,
     index_style,
+    line_styles,
     narrow_changes,
     sheet_range,
 )
@@ -32,13 +34,15 @@ from enumsol.support.messages import counted
 from enumsol.support.plotting import axes_or_none, checked_units, figure_of, in_units, kept, new_figure, plain_axes
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Iterator, Sequence
     from pathlib import Path
 
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
+    from enumsol.branches.elements import Arc
     from enumsol.branches.graph_data import GraphData
+    from enumsol.support.array_types import Floats
 
 
 #: A third of a pixel of a large panel: with more of it corners are seen, with less drawing takes longer.
@@ -62,7 +66,8 @@ def plot_graph(
     """A matplotlib figure of the branches: one panel of an overview, or one panel per node.
 
     Branches that coincide in the quantity shown are drawn side by side, which a note says. In overviews the line style
-    tells the index, in panels of nodes the status of the node.
+    tells the index, or, once ``stability`` was asked for, where an arc runs away (dashed), where it does not (solid),
+    and where that is undecided (dotted); in panels of nodes it tells the status of the node.
 
     Parameters
     ----------
@@ -217,15 +222,16 @@ def _panel(
                 axis.fill_between(*band, color=GREY, alpha=0.25, linewidth=0)
         elif arc.number in drawn:
             curve, place = drawn[arc.number], places[arc.number]
-            line = STATUS_STYLES[arc.statuses[row]] if quantity.by_node else index_style(arc.index)
             colour = colour_of(graph.branch_of[arc.number])
-            (artist,) = axis.plot(curve.alphas, curve.values[:, row], linestyle=line, color=colour, linewidth=1.6)
-            if place.among > 1:
-                # points between two, and no more for all of them
-                step = min(2.6, 6.0 / (place.among - 1))
-                away = (place.rank - (place.among - 1) / 2) * step / 72.0
-                artist.set_transform(axis.transData + ScaledTranslation(-0.4 * away, away, axis.figure.dpi_scale_trans))
-                artist.set_linewidth(min(1.6, max(0.5, 0.8 * step)))
+            for line, alphas, values in _pieces(graph, arc, curve, quantity, row):
+                (artist,) = axis.plot(alphas, values, linestyle=line, color=colour, linewidth=1.6)
+                if place.among > 1:
+                    # points between two, and no more for all of them
+                    step = min(2.6, 6.0 / (place.among - 1))
+                    away = (place.rank - (place.among - 1) / 2) * step / 72.0
+                    moved = ScaledTranslation(-0.4 * away, away, axis.figure.dpi_scale_trans)
+                    artist.set_transform(axis.transData + moved)
+                    artist.set_linewidth(min(1.6, max(0.5, 0.8 * step)))
     for v in graph.vertices:
         if not window[0] <= v.alpha <= window[1]:
             continue
@@ -239,6 +245,20 @@ def _panel(
     if height is not None:
         axis.set_ylim(*height)
     return Panel(axis, drawn, places, graph.branch_of, row)
+
+
+def _pieces(
+    graph: GraphData, arc: Arc, curve: Curve, quantity: Quantity, row: int
+) -> Iterator[tuple[Any, Floats, Floats]]:
+    """Line styles, alphas and values of the parts of an arc that look different."""
+    if quantity.by_node or graph.verdicts is None:
+        line = STATUS_STYLES[arc.statuses[row]] if quantity.by_node else index_style(arc.index)
+        yield line, curve.alphas, curve.values[:, row]
+        return
+    spans = graph.verdicts[arc.number]
+    ends = [spans[0].low, *(span.high for span in spans)]
+    for span, part in zip(spans, cut_at(curve, row, ends), strict=True):
+        yield VERDICT_STYLES[span.verdict], *part
 
 
 def _ending(
@@ -303,15 +323,10 @@ def _words(
     arcs = [arc for arc in graph.arcs if not arc.dimension]
     others |= {"continuum"} if any(v.family is not None for v in graph.vertices) else set()
     others |= {"sheet"} if len(arcs) < len(graph.arcs) and quantity.dimension == "force" else set()
-    entries = handles(
-        {v.kind for v in graph.vertices},
-        {s for arc in arcs for s in arc.statuses} if quantity.by_node else (),
-        () if quantity.by_node else {arc.index for arc in arcs},
-        others,
-    )
+    entries = handles({v.kind for v in graph.vertices}, line_styles(graph, by_node=quantity.by_node), others)
     if alone:
         first.legend(handles=entries, frameon=False, fontsize=7)
     else:
-        rows = -(-len(entries) // 6) or 1
+        rows = -(-len(entries) // (6 if graph.verdicts is None else 5)) or 1  # of longer words fewer
         across = -(-len(entries) // rows) or 1
         figure.legend(handles=entries, loc="outside upper center", ncols=across, frameon=False, fontsize=8)

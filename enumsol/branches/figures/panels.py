@@ -9,6 +9,7 @@ import numpy as np
 
 from enumsol.branches.elements import VertexKind
 from enumsol.branches.figures.curves import Curve, CurvePlace, Quantity, columns, state_columns
+from enumsol.branches.graph_data import VERDICTS
 from enumsol.model.statuses import ContactStatus
 from enumsol.support.plotting import area_entry, line_entry, plain_axes
 
@@ -20,6 +21,7 @@ if TYPE_CHECKING:
 
     from enumsol.branches.claims import Claims, MultiplicitySteps
     from enumsol.branches.elements import Arc, Vertex
+    from enumsol.branches.graph_data import GraphData
     from enumsol.model.problem import ContactProblem
     from enumsol.roots.root import RootFamily
     from enumsol.roots.root_set import RootSet
@@ -39,6 +41,8 @@ STATUS_STYLES: dict[ContactStatus, Any] = {
 }
 #: Of overviews, by the index of the arc.
 INDEX_STYLES: dict[int | None, Any] = {1: "-", -1: (0, (5, 2.5)), None: (0, (1.2, 1.6))}
+#: Of overviews whose verdicts are known.
+VERDICT_STYLES: dict[str, Any] = dict(zip(VERDICTS, INDEX_STYLES.values(), strict=True))
 #: Ranges of alpha in which solutions may be missing, narrow ones as a line.
 OPEN_RANGE: dict[str, Any] = {"facecolor": "#f3d3d6", "edgecolor": "#c23b4b", "linewidth": 0.6}
 MARKERS = {
@@ -64,6 +68,23 @@ def index_style(index: int | None) -> Any:
     return INDEX_STYLES.get(index, INDEX_STYLES[None])
 
 
+def line_styles(graph: GraphData, *, by_node: bool) -> dict[str, Any]:
+    """The line styles that a figure of a graph shows, by the words of the legend."""
+    arcs = [arc for arc in graph.arcs if not arc.dimension]
+    if by_node:
+        statuses = {status for arc in arcs for status in arc.statuses}
+        return {status.value: style for status, style in STATUS_STYLES.items() if status in statuses}
+    if graph.verdicts is not None:
+        verdicts = {span.verdict for arc in arcs for span in graph.verdicts[arc.number]}
+        return {verdict: style for verdict, style in VERDICT_STYLES.items() if verdict in verdicts}
+    known = {arc.index if arc.index in INDEX_STYLES else None for arc in arcs}
+    return {
+        "other index" if index is None else f"index {index:+d}": style
+        for index, style in INDEX_STYLES.items()
+        if index in known
+    }
+
+
 #: Entries of a legend for what is no line of a branch and no vertex, by names.
 OTHERS: dict[str, tuple[Callable[..., Any], str, dict[str, Any]]] = {
     "continuum": (line_entry, "continuum", {"color": GREY, "linewidth": 2.4}),
@@ -73,17 +94,8 @@ OTHERS: dict[str, tuple[Callable[..., Any], str, dict[str, Any]]] = {
 }
 
 
-def handles(
-    kinds: Iterable[VertexKind], statuses: Iterable[ContactStatus], indices: Iterable[int | None], others: set[str]
-) -> list[Any]:
-    """Entries of a legend for what a figure shows; ``others`` are names in `OTHERS`."""
-    known = {index if index in INDEX_STYLES else None for index in indices}
-    styles = {status.value: STATUS_STYLES[status] for status in STATUS_STYLES if status in set(statuses)}
-    styles |= {
-        "other index" if index is None else f"index {index:+d}": style
-        for index, style in INDEX_STYLES.items()
-        if index in known
-    }
+def handles(kinds: Iterable[VertexKind], styles: Mapping[str, Any], others: set[str]) -> list[Any]:
+    """Entries of a legend for what a figure shows: ``styles`` of lines; ``others`` are names in `OTHERS`."""
     marked = [MARKERS[kind] for kind in MARKERS if kind in set(kinds)]
     return [
         *(line_entry(label, color="#666666", linestyle=style) for label, style in styles.items()),

@@ -1,0 +1,135 @@
+"""Which arcs run away: verdicts of graphs, and that what follows shows them."""
+
+import time
+from itertools import pairwise
+
+import numpy as np
+import pytest
+
+import enumsol
+from enumsol.support.deadlines import Deadline, TimeOverError, within
+
+QUIET, AWAY = "does not run away", "runs away"
+
+
+@pytest.fixture
+def triangle():
+    return enumsol.branch_graph(enumsol.gallery.one_node_triangle(), (0, 3))
+
+
+@pytest.fixture(scope="module")
+def square():
+    found = enumsol.branch_graph(enumsol.gallery.two_node_square(), (0, 10))
+    found.stability()
+    return found
+
+
+@pytest.fixture(scope="module")
+def untold():
+    return enumsol.branch_graph(enumsol.gallery.two_node_square(), (0, 10))
+
+
+def test_verdicts_of_arcs_are_those_of_their_roots(square):
+    found = square.stability()
+    assert len(found) == len(square.arcs)
+    for arc, spans in zip(square.arcs, found, strict=True):
+        assert (spans[0].low, spans[-1].high) == (arc.lo, arc.hi)
+        assert all(a.high == b.low for a, b in pairwise(spans))
+    alpha = 3.5
+    roots = square.roots_at(alpha)
+    by_statuses = {
+        arc.statuses: span.verdict
+        for arc, spans in zip(square.arcs, found, strict=True)
+        for span in spans
+        if span.low <= alpha <= span.high
+    }
+    assert {root.statuses: one.verdict for root, one in zip(roots, roots.stability(), strict=True)} == by_statuses
+    assert sorted(by_statuses.values()) == [QUIET] * 2 + [AWAY] * 3
+
+
+def test_a_mass_that_is_given_counts_and_stays(triangle):
+    assert triangle.verdicts is None
+    once = triangle.stability(mass=np.eye(2))
+    assert triangle.verdicts is not None
+    assert triangle.stability() == once == triangle.verdicts
+    assert [spans[0].verdict for spans in once] == [QUIET, QUIET, AWAY]
+    assert once[2][0].growth[0] < once[2][0].growth[1]
+
+
+def test_what_is_cut_short_goes_on(triangle):
+    with within(Deadline(time.perf_counter() - 1)), pytest.raises(TimeOverError):
+        triangle.stability()
+    assert triangle.verdicts is None
+    with pytest.raises(enumsol.InvalidProblemError):
+        triangle.stability(mass=-np.eye(triangle.problem.n))
+    found = triangle.stability()
+    triangle._found["verdicts"] = [*found[:2]]  # as if it had been cut short there
+    assert triangle.verdicts is None
+    assert triangle.stability() == found
+
+
+def test_no_mass_and_3d_are_refused():
+    problem = enumsol.ContactProblem(np.eye(2), [[1, 0]], [[0, 1]], [1, 2], friction=0.5)
+    graph = enumsol.branch_graph(problem, (0, 1))
+    with pytest.raises(enumsol.InvalidArgumentError, match="no mass and no mesh; expected mass"):
+        graph.stability()
+    space = enumsol.branch_graph(enumsol.gallery.one_node_3d(), (0, 1))
+    with pytest.raises(enumsol.InvalidArgumentError, match=r"roots_at\(alpha\)\.stability\(\)"):
+        space.stability()
+
+
+def lines_of(figure, colour):
+    """Line styles of curves of a colour in the first panel."""
+    drawn = [line for line in figure.axes[0].lines if line.get_color() == colour and line.get_linewidth() == 1.6]
+    return [styled(line) for line in drawn]
+
+
+def styled(line):
+    """The words for a line style."""
+    return {None: QUIET, 5: AWAY, 1.2: "undecided"}[(line._unscaled_dash_pattern[1] or [None])[0]]
+
+
+def legend_of(figure):
+    return [text.get_text() for legend in figure.legends for text in legend.get_texts()]
+
+
+def test_figures_draw_what_runs_away_dashed(square, untold):
+    assert {"index +1", "index -1"} <= set(legend_of(untold.plot(zoom=False)))
+    figure = square.plot(zoom=False)
+    words = legend_of(figure)
+    assert words[:2] == [QUIET, AWAY]
+    assert not any("index" in word for word in words)
+    assert lines_of(figure, "#1f5fa8") == [QUIET]
+    assert lines_of(figure, "#d9730d") == [AWAY, QUIET, AWAY, AWAY]
+    # of nodes the statuses
+    assert set(legend_of(square.plot("lambda_n"))) >= {"open", "stick"}
+
+
+def test_an_arc_with_several_verdicts_is_drawn_in_pieces(triangle):
+    triangle.stability()
+    low, high = triangle.arcs[2].lo, triangle.arcs[2].hi
+    parts = [(low, 2.75, QUIET), (2.75, 2.76, "undecided"), (2.76, 2.9, AWAY), (2.9, high, "undecided")]
+    spans = tuple(enumsol.Span(*part) for part in parts)
+    triangle._found["verdicts"] = [*triangle.verdicts[:2], spans]
+    figure = triangle.plot("sum_t", zoom=False)
+    assert legend_of(figure)[:3] == [QUIET, AWAY, "undecided"]
+    drawn = [line for line in figure.axes[0].lines if line.get_linewidth() == 1.6][2:]
+    assert [styled(line) for line in drawn] == [part[2] for part in parts]
+    assert [(line.get_xdata()[0], line.get_xdata()[-1]) for line in drawn] == [part[:2] for part in parts]
+    for line in drawn:
+        exact = [triangle.arcs[2].state(min(x, high))[0][1] for x in line.get_xdata()]
+        assert line.get_ydata() == pytest.approx(exact, abs=1e-3)
+    assert triangle.to_frame().stability.tolist() == [QUIET, QUIET, f"{QUIET}, then {AWAY}, partly undecided"]
+    assert [span["verdict"] for span in triangle.summary()["stability"][2]] == [part[2] for part in parts]
+
+
+def test_printed_graphs_and_tables_show_verdicts(square, untold):
+    assert "stability" not in repr(untold)
+    assert "stability" not in untold.to_frame()
+    assert "stability" not in untold.summary()
+    text = repr(square)
+    assert f"    stability: {QUIET}\n" in text
+    assert f"    stability: {QUIET} (1 arc); {AWAY} (3 arcs)\n" in text
+    assert "stability: whether the body can leave it along a straight line" in text
+    assert ">stability</th>" in square._repr_html_()
+    assert square.to_frame().stability.tolist() == [QUIET, AWAY, QUIET, AWAY, AWAY]
