@@ -92,13 +92,21 @@ class DynamicStiffness:
         Rigid modes N, A N = 0, of a body that nothing holds.
     springs : (n, n) sparse matrix, optional
         With them A is positive definite.
+    rest : Ball (m, m), optional
+        B A^-1 B', if it is known.
     """
 
     def __init__(
-        self, A: sp.csc_array, M: sp.csc_array, rows: sp.csr_array, modes: Floats | None = None, springs: Any = None
+        self,
+        A: sp.csc_array,
+        M: sp.csc_array,
+        rows: sp.csr_array,
+        modes: Floats | None = None,
+        springs: Any = None,
+        rest: Ball | None = None,
     ) -> None:
         self.A, self.M, self.rows, self._modes, self.springs = A, M, rows, modes, springs
-        self._known: dict[float, Ball | None] = {}
+        self._rest, self._known = rest, dict[float, Ball | None]()
         #: What a search keeps of it in floats.
         self.spectrum: Any = None
 
@@ -167,7 +175,7 @@ class DynamicStiffness:
 
     def _compliance(self, mu: float) -> Ball:
         if mu == 0:
-            return Pencil(self.A, self.rows).compliance()
+            return Pencil(self.A, self.rows).compliance() if self._rest is None else self._rest
         added = mu * self.M
         rounding = (abs(self.A) + 2.0 * abs(added)) * (2.0 * UNIT)
         return Pencil(sp.csc_array(self.A + added), self.rows).compliance(rounding)

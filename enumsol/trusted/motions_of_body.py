@@ -6,6 +6,7 @@ coefficients of friction and, in 3D, bounds of the tangential forces.
 
 from __future__ import annotations
 
+from contextlib import suppress
 from dataclasses import dataclass
 from fractions import Fraction
 from typing import TYPE_CHECKING, Any
@@ -17,7 +18,7 @@ from scipy.sparse.csgraph import connected_components
 from enumsol.arithmetic.balls import SAFE, TINY, UNIT, Ball, hull
 from enumsol.condensation.data import exactly_at
 from enumsol.condensation.dynamic import DynamicStiffness
-from enumsol.condensation.enclosure import nearest_floats
+from enumsol.condensation.enclosure import NotEnclosedError, nearest_floats
 from enumsol.errors import InvalidArgumentError
 from enumsol.model.mass import checked_mass
 from enumsol.support.arguments import alpha_value
@@ -171,14 +172,19 @@ class BodyMotions:
         """Stiffness of some rows of a part."""
         key, problem = (part, tuple(rows)), self.problem
         if key not in self._stiffness:
-            modes = springs = None
-            if not problem.held:
+            modes = springs = rest = None
+            if problem.held:
+                # a search has enclosed S of all rows already
+                with suppress(NotEnclosedError):
+                    known = problem.enclosure
+                    rest = Ball(known.S[np.ix_(rows, rows)], known.S_rad[np.ix_(rows, rows)])
+            else:
                 N = problem.modes.N[dofs]
                 modes = N[:, np.any(N != 0, axis=0)]
                 springs = sp.csc_array(problem.modes.springs())[dofs][:, dofs]
             A, M = (sp.csc_array(sp.csr_array(matrix)[dofs][:, dofs]) for matrix in (problem.A, self.mass))
             B = sp.csr_array(sp.csr_array(problem.contact_rows)[rows][:, dofs])
-            self._stiffness[key] = DynamicStiffness(A, M, B, modes, springs)
+            self._stiffness[key] = DynamicStiffness(A, M, B, modes, springs, rest)
         return self._stiffness[key]
 
 
