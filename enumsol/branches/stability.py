@@ -132,6 +132,8 @@ class ArcStabilities:
             extended = _extended(hint, setting)
             if extended is not False:
                 return extended
+        if any(_extended(hint, at) is not False for hint in self._hints):
+            return False  # known at the middle: the range is too long
         proven = StabilitySearch(at.stiffness, at.motions).run()
         self._hints = [proven, *self._hints[:3]]
         return _extended(proven, setting)
@@ -141,6 +143,9 @@ def _extended(proven: Proven, setting: Setting) -> bool | tuple[float, float]:
     """What is proven at one alpha, if it holds for a range of them."""
     stiffness, motions = setting.stiffness, setting.motions
     for tried, _ in proven.growing:
+        crossing = StabilitySearch(stiffness, motions).crossing_near(tried)
+        if crossing is not None:
+            return float(np.sqrt(crossing.low) * (1 - 2.0**-50)), float(np.sqrt(crossing.high) * (1 + 2.0**-50))
         at = StabilitySearch(stiffness, motions).zero_near(tried)
         if at is None:
             continue

@@ -21,7 +21,7 @@ from enumsol.errors import InvalidProblemError
 from enumsol.model.statuses import OPEN, SLIP_MINUS, SLIP_PLUS, STICK
 from enumsol.support.conic import conic_answer
 from enumsol.support.deadlines import look
-from enumsol.trusted.running_away import Growing, Motion, Motions, NoMotion
+from enumsol.trusted.running_away import Crossing, Growing, Motion, Motions, NoMotion
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
@@ -285,6 +285,27 @@ class StabilitySearch:
                         yield tried, found
                         break
 
+    def crossing_near(self, known: Growing) -> Crossing | None:
+        """A range of mu in which some motion is proven to grow, about one that is known for other coefficients."""
+        unit = float(np.exp2(np.round(np.log2(known.low))))
+        high = next((unit * _STRIDE**k for k in range(1, 6) if self._definite_at(unit * _STRIDE**k)), None)
+        if high is None:
+            return None
+        for low in (unit / 4, unit / _STRIDE, unit / _STRIDE**2, 0.0):
+            K = self.stiffness.at(low)
+            push = None if K is None else _push(self.motions.slopes.mid.T @ K.mid @ self.motions.moves.mid)
+            if push is None:
+                continue
+            tried = Crossing(low, high, push)
+            if tried.holds(self.stiffness, self.motions):
+                return tried
+        return None
+
+    def _definite_at(self, mu: float) -> bool:
+        """Whether plain numbers serve at one mu, in floats."""
+        K = self.stiffness.at(mu)
+        return K is not None and self._serves(K.mid)
+
     def zero_near(self, known: Growing) -> float | None:
         """About the mu at which a motion grows that grew at another one under slightly other coefficients."""
         rows, model = known.equations(self.motions), Spectrum.of(self.stiffness)
@@ -521,6 +542,21 @@ class Spectrum:
             return Ball.exact(np.asarray(np.linalg.inv((self._rows / weights) @ self._rows.T), dtype=np.float64))
         except np.linalg.LinAlgError:
             return None
+
+
+def _push(L: Floats) -> Floats | None:
+    """p >= 0 that adds up to one with p'L < 0, the more the better, if there is one."""
+    k = len(L)
+    if not k or L.shape != (k, k):
+        return None
+    unit = 1.0 / np.sqrt(np.maximum(np.abs(L.diagonal()), np.finfo(float).tiny))
+    scaled = L * unit[:, None] * unit
+    limits = np.hstack([scaled.T, np.ones((k, 1))])
+    goal = np.append(np.zeros(k), -1.0)
+    whole = np.append(np.ones(k), 0.0)[None]
+    bounds = [(0.0, None)] * k + [(None, None)]
+    found = scipy.optimize.linprog(goal, limits, np.zeros(k), whole, [1.0], bounds)
+    return found.x[:k] * unit if found.status == 0 and found.x[k] > 0 else None
 
 
 def _determinant(matrices: Floats) -> Floats:

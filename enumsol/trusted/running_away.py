@@ -361,6 +361,38 @@ class Growing:
         return True
 
 
+@dataclass(frozen=True, eq=False)
+class Crossing:
+    """A range of mu in which some motion grows, whatever it is (theory, section 15.4).
+
+    Attributes
+    ----------
+    low, high : float
+        Some motion grows for a mu between them.
+    push : (k,) array, >= 0
+        Rows r with these weights are negative at ``low`` for all x >= 0 but zero.
+    """
+
+    low: float
+    high: float
+    push: Floats
+
+    def holds(self, stiffness: Stiffness, motions: Motions) -> bool:
+        """True if it is proven; only where no node touches and all are at their limit for certain."""
+        if motions.touching or motions.unsure or not 0 <= self.low < self.high < np.inf:
+            return False
+        if self.push.shape != (motions.limits,) or not np.all(np.isfinite(self.push)) or np.any(self.push < 0):
+            return False
+        first, last = stiffness.at(self.low), stiffness.at(self.high)
+        if first is None or last is None or not motions.limits:
+            return False
+        with np.errstate(all="ignore"):
+            pushed = Ball.exact(self.push[None]) @ _across(motions.slopes, first, motions.moves)
+            return bool(np.all(pushed.mid + pushed.rad < 0)) and positive(
+                _across(motions.slopes, last, motions.moves).symmetric
+            )
+
+
 def _slope(motions: Motions, node: Touching, code: int) -> Ball:
     """T of a node that touches and begins to slip."""
     along, leaves = motions.moves[:, list(node.slides)], motions.moves[:, [node.leaves]]
