@@ -1,0 +1,98 @@
+"""Ranges of mu in which some motion grows by Theorem 15.6, against all sets of sliding nodes in floats."""
+
+import dataclasses
+
+import numpy as np
+import pytest
+import scipy.linalg
+from growing_motions import growing_motions
+from linear_motions import random_motion, setting
+
+import enumsol
+from enumsol.branches.stability import ArcStabilities
+from enumsol.search.stability import StabilitySearch
+from enumsol.trusted.running_away import Crossing
+
+#: One node at its limit that K(0) pushes on: A, M, Bn, Bt, F, kinds and signs.
+ONE_NODE = (
+    np.array([[2.0, 1.0], [1.0, 2.0]]),
+    np.eye(2),
+    np.array([[1.0, 0.0]]),
+    np.array([[0.0, 1.0]]),
+    np.array([3.0]),
+    ["limit"],
+    np.array([1.0]),
+)
+
+
+def proven_crossings(seeds):
+    """Crossings that the search proposes and that hold, with all mu at which the judge finds motions."""
+    for seed in seeds:
+        data = random_motion(np.random.default_rng(seed))
+        stiffness, motions = setting(*data)
+        search = StabilitySearch(stiffness, motions)
+        growing = search.run().growing
+        for known, _ in growing:
+            found = search.crossing_near(known)
+            if found is not None:
+                yield stiffness, motions, found, [mu for mu, *_ in growing_motions(*data)]
+
+
+@pytest.mark.slow
+def test_in_a_crossing_a_motion_grows():
+    count = 0
+    for stiffness, motions, crossing, judged in proven_crossings([(11, k) for k in range(60)]):
+        assert crossing.holds(stiffness, motions)
+        assert any(crossing.low <= mu <= crossing.high for mu in judged)
+        count += 1
+    assert count
+
+
+@pytest.mark.slow
+def test_crossings_anywhere():
+    rng, accepted = np.random.default_rng(5), 0
+    for k in range(80):
+        data = random_motion(rng)
+        stiffness, motions = setting(*data)
+        if not motions.limits:
+            continue
+        judged = None
+        for low in (0.0, *(10.0 ** rng.uniform(-3, 3, 3))):
+            L = motions.slopes.mid.T @ stiffness.at(float(low)).mid @ motions.moves.mid
+            exact = scipy.linalg.eig(L.T)
+            push = np.abs(exact[1][:, int(np.argmin(exact[0].real))].real)
+            for high in low + 10.0 ** rng.uniform(-2, 5, 3):
+                tried = Crossing(float(low), float(high), push)
+                if tried.holds(stiffness, motions):
+                    accepted += 1
+                    judged = [mu for mu, *_ in growing_motions(*data)] if judged is None else judged
+                    assert any(tried.low <= mu <= tried.high for mu in judged), k
+    assert accepted
+
+
+@pytest.mark.parametrize("change", [{"low": -1.0}, {"high": np.inf}, {"low": np.nan}, {"high": 1e-9}])
+def test_ranges_that_make_no_sense(change):
+    stiffness, motions = setting(*ONE_NODE)
+    crossing = Crossing(0.0, 64.0, np.ones(1))
+    assert crossing.holds(stiffness, motions)
+    assert not dataclasses.replace(crossing, **change).holds(stiffness, motions)
+    for push in (-crossing.push, np.full_like(crossing.push, np.nan), crossing.push[:-1], 0 * crossing.push):
+        assert not dataclasses.replace(crossing, push=push).holds(stiffness, motions)
+
+
+@pytest.mark.slow
+def test_verdicts_along_arcs_are_those_of_their_roots():
+    problem = enumsol.gallery.get("brake-shoe-9").build()
+    graph = enumsol.branch_graph(problem, (0.3, 0.5))
+    asked = ArcStabilities(problem)
+    for arc in graph.arcs:
+        for span in asked.spans(arc):
+            if span.verdict == "undecided" or span.low == span.high:
+                continue
+            alpha = 0.5 * (span.low + span.high)
+            there = [root for root in graph.roots_at(alpha) if root.statuses == arc.statuses]
+            verdicts = {enumsol.stability(problem, root).verdict for root in there}
+            assert verdicts == {span.verdict}
+            if span.growth is not None:
+                (found,) = [enumsol.stability(problem, root) for root in there]
+                assert span.growth[0] <= found.growth_rates[0] <= span.growth[1]
