@@ -53,7 +53,7 @@ class _Stage:
 
 
 @dataclass(frozen=True)
-class _Part:
+class SearchRecords:
     """The records of one search, as a checker of root sets reads them."""
 
     lines: list[Any]
@@ -150,7 +150,7 @@ class HistoryChecker(ProofChecker):
         checker.enclosure, checker.located = enclosure_of(problem), {}
         tell("searches", number, count)
         with heard_by(tell_part(f"of search {number + 1}")):
-            report = checker.run(_Part(_search(records)))
+            report = checker.run(SearchRecords(search_records(records)))
         where = f"search {number} (step {stage.step})"
         self.failures += [f"{where}: {failure}" for failure in report.failures]
         if len(self.failures) >= MAX_FAILURES:
@@ -238,7 +238,7 @@ class HistoryChecker(ProofChecker):
         )
 
 
-def _search(records: Iterator[Any]) -> list[Any]:
+def search_records(records: Iterator[Any]) -> list[Any]:
     """The records of the next search: up to the object that ends it."""
     lines: list[Any] = []
     for record in records:

@@ -264,21 +264,20 @@ class Checker(TreeChecker[EnclosedSystem, "VerifiedSelection | ClosedSolution | 
     def _locate(self, name: Codes, ball: VerifiedSelection | ClosedSolution | JointRoot, codes: Codes = ()) -> None:
         del codes  # those that are certain follow from the balls
         if self.located is not None:
-            p = self.problem.p
             mid, rad = ball.force.mid, ball.force.rad
             rad = np.where((mid == 0) & (rad == 0), 0.0, rad * self.force + TINY)
             rigid = None if isinstance(ball, ClosedSolution) else ball.rigid
             if rigid is not None:
                 rigid = rigid * Ball.exact(self.system.rigid_unit)
             among = ball.possible if isinstance(ball, JointRoot) else None
-            self._locate_by(name, Ball(mid * self.force, rad), ball.w[p:], rigid, among)
+            self._locate_by(name, Ball(mid * self.force, rad), ball.w, rigid, among)
 
-    def _locate_by(
-        self, name: Codes, forces: Ball, slips: Ball, rigid: Ball | None, among: Among | None = None
-    ) -> None:
-        """Take note of a root by its forces and rigid displacement in the problem's units, its slips in any unit."""
+    def _locate_by(self, name: Codes, forces: Ball, w: Ball, rigid: Ball | None, among: Among | None = None) -> None:
+        """Take note of a root by its forces and rigid displacement in the problem's units, and by w in any unit."""
+        p = self.problem.p
+        gaps, slips = w[:p], w[p:]
         still, codes = (slips.mid == 0) & (slips.rad == 0), certain_statuses(forces, slips)
-        self.locate(name, Located(forces, still, codes, rigid, among))
+        self.locate(name, Located(forces, still, codes, rigid, among, -gaps.mid > gaps.rad))
 
     def locate_rational_roots(self) -> None:
         """Add the isolated roots that rationals have found to ``located``."""
@@ -288,21 +287,24 @@ class Checker(TreeChecker[EnclosedSystem, "VerifiedSelection | ClosedSolution | 
                 continue
             exact = [Fraction(x) for x in points[0]]
             near = np.array([float(x) for x in exact])
-            w = [Fraction(0)] * p if not any(exact) and self.problem.is_unloaded(self.alpha) else self._slips(exact)
+            w = [Fraction(0)] * 2 * p if not any(exact) and self.problem.is_unloaded(self.alpha) else self._moved(exact)
             signs = np.array([float(x > 0) - float(x < 0) for x in w])
             known = Ball(near, np.where([x == 0 for x in exact], 0.0, np.abs(near) * 2 * UNIT + TINY))
             rigid = -known[2 * p :] if len(exact) > 2 * p else None
-            self._locate_by(codes, known[: 2 * p], Ball(signs, np.zeros(p)), rigid)
+            self._locate_by(codes, known[: 2 * p], Ball(signs, np.zeros(2 * p)), rigid)
 
-    def _slips(self, point: list[Fraction]) -> list[Any]:
-        """w_t at a point, exactly."""
+    def _moved(self, point: list[Fraction]) -> list[Any]:
+        """Numbers with the signs of w at a point."""
         from enumsol.arithmetic.rationals import rational  # python-flint, as above
 
         numbers = [rational(x) for x in point]
         if self.problem.held:
-            return self._body.moved(numbers)[len(point) // 2 :]
-        rows = (self.rational.row(5, node) for node in range(self.problem.p))
-        return [sum((a * x for a, x in zip(form, numbers, strict=True)), constant) for form, constant in rows]
+            return list(self._body.moved(numbers))
+        signs = ((kind, sign, node) for kind, sign in ((4, -1), (5, 1)) for node in range(self.problem.p))
+        rows = ((sign, *self.rational.row(kind, node)) for kind, sign, node in signs)
+        return [
+            sign * sum((a * x for a, x in zip(form, numbers, strict=True)), constant) for sign, form, constant in rows
+        ]
 
     def _rests_on_reach(self, codes: Codes, points: Sequence[Sequence[Fraction]]) -> bool:
         """True if a selection may hold more without the bounds of the rigid displacement."""

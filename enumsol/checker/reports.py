@@ -230,6 +230,84 @@ class HistoryVerificationReport:
         )
 
 
+@dataclass(frozen=True)
+class StabilityVerificationReport:
+    """Result of checking the proof of which roots run away.
+
+    Attributes
+    ----------
+    ok : bool
+        The proof of the roots holds, and so does what is said of each of them.
+    failures : tuple of str
+        Why the proof was refused.
+    verdicts : tuple of str
+        For every root, in the order of the records, "runs away", "does not run away" or "undecided": also where
+        bounds do not tell strictly what a contact node does. Empty for a refused proof.
+    bounds : tuple of (float, float) or None
+        For every root that runs away, bounds of the growth rate of a motion.
+    roots : VerificationReport or None
+        About the proof of the roots.
+
+    Examples
+    --------
+    >>> import enumsol
+    >>> problem = enumsol.gallery.get("taper-8").build()
+    >>> proof = enumsol.enumerate_roots(problem, alpha=0.2).stability_proof()
+    >>> enumsol.verify(problem, proof)
+    proof: verified for the stability of 3 roots at alpha = 0.2
+      root 0: does not run away
+      root 1: runs away, growing like exp(rho t), rho = 3.4249
+      root 2: does not run away
+      in all: 1 run away, 2 do not, 0 undecided
+      list of roots: complete
+      complete: yes
+    """
+
+    ok: bool = False
+    failures: tuple[str, ...] = ()
+    verdicts: tuple[str, ...] = ()
+    bounds: tuple[tuple[float, float] | None, ...] = ()
+    roots: VerificationReport | None = None
+
+    @property
+    def complete(self) -> bool:
+        """The roots are all, none of them in a family, and of each it is proven whether it runs away."""
+        if not self.ok or self.roots is None or "undecided" in self.verdicts:
+            return False
+        return self.roots.complete and not self.roots.families
+
+    def _repr_html_(self) -> str:
+        return html_lines(repr(self).splitlines())
+
+    def __repr__(self) -> str:
+        roots = self.roots
+        where = "" if roots is None or roots.alpha is None else f" at alpha = {shown_alpha(roots.alpha)}"
+        if not self.ok or roots is None:
+            read = "no roots" if roots is None else counted(roots.roots, "root")
+            return _refusal(f" for the stability of roots{where}", self.failures, read)
+        away = self.verdicts.count("runs away")
+        others, unknown = self.verdicts.count("does not run away"), self.verdicts.count("undecided")
+        left = "" if not roots.families else f", {counted(roots.families, 'family', 'families')} left out"
+        return "\n".join(
+            (
+                f"proof: verified for the stability of {counted(len(self.verdicts), 'root')}{where}",
+                *(f"  root {k}: {self._of(k)}" for k in range(min(len(self.verdicts), _MOST_STEPS))),
+                *([f"  ... {len(self.verdicts) - _MOST_STEPS} more"] if len(self.verdicts) > _MOST_STEPS else []),
+                f"  in all: {away} run away, {others} do not, {unknown} undecided{left}",
+                f"  list of roots: {'complete' if roots.complete else 'not complete'}{_bound(roots.within)}",
+                f"  complete: {'yes' if self.complete else 'no'}",
+            )
+        )
+
+    def _of(self, k: int) -> str:
+        """The verdict on a root, with bounds of the growth rate."""
+        known = self.bounds[k]
+        return self.verdicts[k] + ("" if known is None else f", growing like exp(rho t), rho = {known[0]:.6g}")
+
+
+#: What the checkers report.
+AnyReport = VerificationReport | GraphVerificationReport | HistoryVerificationReport | StabilityVerificationReport
+
 _DATA = {"problem": "A, Bn, Bt, f as given", "condensed": "S and g as computed"}
 
 

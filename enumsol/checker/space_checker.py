@@ -201,7 +201,8 @@ class SpaceChecker(TreeChecker[EnclosedSpace, "SpaceRoot | LooseSolution"]):
         still = np.concatenate([still & (system.tau[:, k] >= 0) for k in (0, 1)])
         rigid = found.rigid if isinstance(found, SpaceRoot) else None
         rigid = None if rigid is None else rigid * Ball.exact(system.rigid_unit)
-        self.locate(_name(name, found), Located(forces, still, certain, rigid))
+        gaps = found.w[:p]
+        self.locate(_name(name, found), Located(forces, still, certain, rigid, open=-gaps.mid > gaps.rad))
 
     def _claim(self, isolated: int, families: int) -> dict[str, int]:
         return {"roots": self.regular + isolated, "undecided": self.undecided, "leaves": self.leaves}

@@ -1,4 +1,4 @@
-"""verify: whether a proof, of a root set, of a branch graph or of a history, holds for a problem.
+"""verify: whether a proof, of a root set, a branch graph, a history or of stability, holds for a problem.
 
 Which checker reads it depends on the problem and on the header; ``enumsol.checker`` lists what they rest on.
 """
@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 from enumsol.checker.graph_checker import GraphChecker
 from enumsol.checker.plane_checker import Checker
+from enumsol.errors import InvalidArgumentError
 from enumsol.model.problem import ContactProblem
 from enumsol.proof.proof_file import Proof
 from enumsol.support.arguments import instance_of, optional_callable
@@ -16,14 +17,21 @@ from enumsol.support.arguments import instance_of, optional_callable
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from enumsol.checker.reports import GraphVerificationReport, HistoryVerificationReport, VerificationReport
+    import scipy.sparse as sp
+
+    from enumsol.checker.reports import AnyReport, GraphVerificationReport, VerificationReport
     from enumsol.model.problem3d import AnyProblem
+    from enumsol.support.array_types import ArrayLike
 
 
 def verify(
-    problem: AnyProblem, proof: Proof, progress: Callable[[int], object] | None = None
-) -> VerificationReport | GraphVerificationReport | HistoryVerificationReport:
-    """Check a proof, of a root set, of a branch graph or of a history, against a problem.
+    problem: AnyProblem,
+    proof: Proof,
+    progress: Callable[[int], object] | None = None,
+    *,
+    mass: ArrayLike | sp.sparray | sp.spmatrix | None = None,
+) -> AnyReport:
+    """Check a proof, of a root set, of a branch graph, of a history or of stability, against a problem.
 
     Parameters
     ----------
@@ -31,10 +39,12 @@ def verify(
     proof : Proof
     progress : callable, optional
         Called regularly with the number of leaves checked.
+    mass : (n, n) array_like or sparse, optional
+        For a proof of stability: the mass that it is about, by default that of the problem.
 
     Returns
     -------
-    VerificationReport, GraphVerificationReport or HistoryVerificationReport
+    VerificationReport, GraphVerificationReport, HistoryVerificationReport or StabilityVerificationReport
 
     Raises
     ------
@@ -42,7 +52,7 @@ def verify(
         The file is damaged (its checksum does not agree), of another version, or holds no sequence of records. Records
         that make no sense, or prove nothing, make the report refuse the proof.
     InvalidArgumentError
-        An argument is of another type.
+        An argument is of another type, or ``mass`` is given with another proof.
 
     Examples
     --------
@@ -63,6 +73,12 @@ def verify(
     lines = proof.records()
     header = next(lines, None)
     kind = header.get("kind") if isinstance(header, dict) else None
+    if kind == "stability":
+        from enumsol.checker.stability_checker import StabilityChecker  # not for other proofs
+
+        return StabilityChecker(problem, header, checker, progress, mass).run(lines)
+    if mass is not None:
+        raise InvalidArgumentError("mass is given with a proof that says nothing of stability; expected none")
     if kind == "history":
         from enumsol.checker.history_checker import HistoryChecker  # not for other proofs
 

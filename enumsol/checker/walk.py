@@ -59,6 +59,8 @@ class Located:
         Of a body that nothing holds, the coordinates of its rigid displacement, in the problem's units.
     among : per node the codes that it may have, or None
         Of a root that is in one of these selections for certain.
+    open : (p,) bool array, or None
+        Nodes with w_n < 0 for certain.
     """
 
     forces: Ball
@@ -66,6 +68,7 @@ class Located:
     codes: tuple[int, ...] | None = None
     rigid: Ball | None = None
     among: Among | None = None
+    open: Mask | None = None
 
 
 @dataclass

@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 
     from enumsol.auditing import AuditReport, PointRun
     from enumsol.branches import BranchGraph
-    from enumsol.checker.reports import GraphVerificationReport, HistoryVerificationReport, VerificationReport
+    from enumsol.checker.reports import AnyReport
     from enumsol.model.problem3d import AnyProblem
     from enumsol.support.array_types import Alpha
 
@@ -147,14 +147,14 @@ _STEPS = {
 
 
 def verify(problem: Problem, proof: Argument, json_file: OutputFile | None = None, quiet: Quiet = False) -> None:
-    """Check the PROOF that a list of roots of PROBLEM, a branch graph or a history is complete.
+    """Check the PROOF that a list of roots of PROBLEM, a graph or a history is complete, or which roots run away.
 
     The checker imports nothing from the search: it computes the condensed problem anew and checks every leaf of the
     search tree. It uses the same rigorous bounds; python -m pydoc enumsol.checker lists what the two share.
 
-    Exit status: 0 if the proof holds and nothing is undecided; 3 if it holds but leaves selections undecided or, for a
-    graph, holds no arcs or leaves parts of them undecided; 2 if it does not hold or cannot be read; 74 if the report
-    could not be written; 141 if the program that read it has ended.
+    Exit status: 0 if the proof holds and nothing is undecided; 3 if it holds but leaves selections or verdicts
+    undecided or, for a graph, holds no arcs or leaves parts of them undecided; 2 if it does not hold or cannot be
+    read; 74 if the report could not be written; 141 if the program that read it has ended.
 
     Parameters
     ----------
@@ -178,7 +178,7 @@ def verify(problem: Problem, proof: Argument, json_file: OutputFile | None = Non
     raise typer.Exit(ExitStatus.DONE if report.complete else ExitStatus.INCOMPLETE)
 
 
-def _content(report: VerificationReport | GraphVerificationReport | HistoryVerificationReport) -> dict[str, Any]:
+def _content(report: AnyReport) -> dict[str, Any]:
     """The report, for JSON; of a graph the number of its selections."""
     content = asdict(report) | {"complete": report.complete}
     if "selections" in content and not isinstance(content["selections"], int):

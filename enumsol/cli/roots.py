@@ -34,7 +34,7 @@ class Search:
         rationals throughout, with proof, for small problems.
     method : tree: a tree search. exhaustive: all 4^p selections, fast or exact, for small p.
     unique : Only report whether there is one solution; stop at a second one.
-    stability : Say which roots run away; PROBLEM has a mesh or a mass.
+    stability : Say which roots run away, in the proof too; PROBLEM has a mesh or a mass.
     stop_after : Stop at N roots; 2 decides whether the solution is unique.
     jobs : Number of processes that search (tree).
     proof_file : Write the proof (verified).
@@ -127,7 +127,10 @@ class Search:
         asked |= {"stop_after": 2 if self.unique else self.stop_after, "proof_path": self.proof_file}
         with common.workers(self.jobs) as executor, search_display() as display:
             found = enumerate_roots(problem, alpha, executor=executor, progress=display, **asked)
-        if self.stability:
+        if self.stability and self.proof_file is not None and found.proof is not None and len(found):
+            # in the place of the proof of the roots, which it holds
+            found.stability_proof().save(self.proof_file)
+        elif self.stability:
             found.stability()
         return found
 

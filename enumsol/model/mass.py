@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -108,3 +109,15 @@ def consistent_mass(points: Floats, cells: Integers, density: Floats) -> sp.csc_
         places = np.repeat(nodes, nodes.shape[1], axis=1).ravel(), np.tile(nodes, nodes.shape[1]).ravel()
         total = total + sp.csc_array(sp.coo_array((own.ravel(), places), shape=total.shape))
     return total
+
+
+def mass_fingerprint(mass: sp.csc_array) -> str:
+    """SHA-256 of a mass: a name, n, and row, column and value of every entry that is not zero, column by column."""
+    entries = sp.coo_array(sp.csc_array(mass))
+    kept = entries.data != 0
+    rows, columns, values = entries.coords[0][kept], entries.coords[1][kept], entries.data[kept]
+    order = np.lexsort((rows, columns))
+    digest = hashlib.sha256(b"enumsol mass 1" + np.array(mass.shape[0], "<i8").tobytes())
+    for part, kind in ((rows, "<i8"), (columns, "<i8"), (values, "<f8")):
+        digest.update(part[order].astype(kind).tobytes())
+    return digest.hexdigest()

@@ -283,6 +283,50 @@ class RootSet(Sequence[Root], Immutable):
             self._found["verdicts"] = self._found["own"]
         return self._found["verdicts"]
 
+    def stability_proof(
+        self, path: str | Path | None = None, *, mass: ArrayLike | sp.sparray | sp.spmatrix | None = None
+    ) -> Proof:
+        """The proof of `stability`, with that of the roots, for ``enumsol.verify(problem, proof)``.
+
+        It confirms verdicts on roots at which every node strictly does what it does; others are undecided in it.
+
+        Parameters
+        ----------
+        path : path, optional
+            Of a file to write; by default the proof is kept in memory.
+        mass : (n, n) array_like or sparse, optional
+            By default that of the problem; ``enumsol.verify`` takes it, too.
+
+        Raises
+        ------
+        InvalidArgumentError, InvalidProblemError
+            As `enumsol.stability`; there are no roots, or no proof of them; the file cannot be written.
+
+        Examples
+        --------
+        >>> import enumsol
+        >>> problem = enumsol.gallery.get("taper-8").build()
+        >>> proof = enumsol.enumerate_roots(problem, alpha=0.2).stability_proof()
+        >>> enumsol.verify(problem, proof).verdicts
+        ('does not run away', 'runs away', 'does not run away')
+        """
+        from enumsol.roots.stability import Stabilities  # as above
+        from enumsol.roots.stability_proof import write_proof
+
+        if not len(self):
+            raise InvalidArgumentError("there is no isolated root; expected one whose stability can be proven")
+        if self.proof is None:
+            raise InvalidArgumentError(
+                f"these roots ({self.arithmetic} arithmetic) have no proof; expected those of a search in verified "
+                "arithmetic that ran to its end"
+            )
+        asked = Stabilities(self[0].problem, mass)
+        found = tuple(asked.of(root) for root in self)
+        self._found["verdicts"] = found
+        if mass is None:
+            self._found["own"] = found
+        return write_proof(self.proof, self, asked, path)
+
     @property
     def verdicts(self) -> tuple[Stability, ...] | None:
         """What `stability` found last, or None."""

@@ -147,9 +147,8 @@ class Stabilities:
         found: list[tuple[float, tuple[float, float], Floats]] = []
         gaps: list[tuple[float, float]] = []
         limits = 0
-        for setting in self.settings(root):
+        for setting, proven in self.examined(root):
             limits += len(setting.limits)
-            proven = self._proven(root, setting)
             gaps += proven.gaps
             if not (proven.growing or proven.gaps or everywhere(proven.ranges)):
                 gaps.append((0.0, np.inf))
@@ -199,13 +198,16 @@ class Stabilities:
         codes = [frozenset(_CODES[status] for status in statuses) for statuses in active]
         return self.body.settings(codes, F, forces, unsure, every=every)
 
-    def _proven(self, root: Root, setting: Setting) -> Proven:
-        """What is proven of one part; in 2D the same for all roots with these nodes and friction."""
-        if self.body.tangents > 1:
-            return StabilitySearch(setting.stiffness, setting.motions).run()
+    def examined(self, root: Root) -> Iterator[tuple[Setting, Proven]]:
+        """Parts of the body with nodes at their limit, and what is proven of them."""
+        for setting in self.settings(root):
+            yield setting, self._proven(setting)
+
+    def _proven(self, setting: Setting) -> Proven:
+        """What is proven of one part: the same for all roots with these nodes, friction and directions."""
         F, moves = setting.motions.slopes, setting.motions.moves
         leaning = tuple((float(node.F.mid), float(node.F.rad)) for node in setting.motions.touching)
-        arrays = (part.tobytes() for part in (F.mid, F.rad, moves.mid))
+        arrays = (part.tobytes() for part in (F.mid, F.rad, moves.mid, moves.rad))
         key = (tuple(setting.rows), setting.motions.unsure, leaning, *arrays)
         if key not in self._known:
             self._known[key] = StabilitySearch(setting.stiffness, setting.motions).run()

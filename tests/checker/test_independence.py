@@ -23,6 +23,7 @@ def inside(room, *modules):
 
 
 CHECKERS = inside("checker", "verify", "plane_checker", "graph_checker", "history_checker", "space_graph")
+CHECKERS.append("enumsol.checker.stability_checker")
 IN_SPACE = {
     *("enumsol.checker.space_checker", "enumsol.condensation.space_condensed", "enumsol.model.sectors"),
     *inside("trusted.space", "resultants", "sector_margins", "sector_rows", "leaves", "boxed_solution"),
@@ -95,6 +96,7 @@ SHARED = {
     "proof.proof_file": {"PROOF_VERSION", "Proof", "fraction_text", "packed", "coarse"},
     "proof.reading": {"fits", "rational_text"},
     "proof.records": None,
+    "proof.stability_records": None,
     "proof.curve_records": None,
     "proof.leaves": None,
     "proof.writer": None,
@@ -238,7 +240,10 @@ def test_no_module_of_the_search_is_loaded_by_a_verification(tmp_path):
     sliding = enumsol.gallery.block_on_table(1, 1, push=1.0)
     proofs.append((sliding, enumerate_roots(sliding, 0)))
     modules = loaded_for(proofs, tmp_path)
-    assert modules >= {*CHECKERS, "enumsol.checker.rational"} - {"enumsol.checker.space_graph"}
+    assert modules >= {*CHECKERS, "enumsol.checker.rational"} - {
+        "enumsol.checker.space_graph",
+        "enumsol.checker.stability_checker",
+    }
     assert not {module for module in modules if is_search(module)}
     assert not modules & IN_SPACE
 

@@ -1,0 +1,303 @@
+"""The checker of proofs of stability: the roots by their own proof, then what grows or does not at each of them.
+
+What a node does at a root is read off the balls of its forces and displacements, strictly; where these do not tell, the
+root stays undecided whatever the proof says. From that trusted code makes the motions that the certificates are about.
+"""
+
+from __future__ import annotations
+
+import itertools
+import math
+from collections import Counter
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from enumsol.checker.history_checker import SearchRecords, search_records
+from enumsol.checker.reports import StabilityVerificationReport
+from enumsol.checker.walk import ProofChecker
+from enumsol.condensation.enclosure import enclosure_of
+from enumsol.errors import InvalidArgumentError, InvalidProblemError
+from enumsol.model.mass import checked_mass, mass_fingerprint
+from enumsol.proof.proof_file import PROOF_VERSION
+from enumsol.proof.reading import RefusedError, quoted, same
+from enumsol.proof.stability_records import (
+    DOES_NOT,
+    RUNS_AWAY,
+    UNDECIDED,
+    VERDICTS,
+    certificate_from,
+    is_certificate,
+    part_of,
+    root_from,
+)
+from enumsol.support.messages import counted
+from enumsol.trusted.motions_of_body import BodyMotions, friction_over
+from enumsol.trusted.running_away import Growing, NoMotion
+from enumsol.trusted.status_rows import OPEN, STICK
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterator
+
+    from enumsol.arithmetic.balls import Ball
+    from enumsol.checker.reports import VerificationReport
+    from enumsol.checker.walk import Located
+    from enumsol.support.array_types import Floats
+    from enumsol.trusted.motions_of_body import Setting
+
+_HEADER = {"format", "version", "kind", "problem", "p", "mass"}
+_END = object()
+#: Above rounding in a few operations.
+_ABOVE, _BELOW = 1 + 2.0**-40, 1 - 2.0**-40
+#: Ways in which nodes slide or stay that are looked at for one range.
+_MOST_WAYS = 20_000
+
+
+@dataclass
+class _Said:
+    """What the proof says of a root."""
+
+    number: int
+    point: Floats
+    verdict: str
+    certificates: list[list[Any]]
+
+
+class StabilityChecker(ProofChecker):
+    """Checks the proof of which roots run away.
+
+    Parameters
+    ----------
+    problem : ContactProblem or ContactProblem3D
+    header : the first record
+    checker : type
+        Of the checker of root sets that fits the problem.
+    progress : callable or None
+        Called with the number of leaves checked.
+    mass : (n, n) array_like or sparse, optional
+        In place of that of the problem.
+    """
+
+    def __init__(
+        self, problem: Any, header: Any, checker: Any, progress: Callable[[int], object] | None, mass: Any = None
+    ) -> None:
+        super().__init__()
+        self.problem, self.header, self.checker = problem, header, checker(problem, progress)
+        self.mass = None if mass is None else checked_mass(mass, problem.A, problem.modes.N)
+        self.report: VerificationReport | None = None
+
+    def run(self, records: Iterator[Any]) -> StabilityVerificationReport:
+        """Check all records after the header.
+
+        Raises
+        ------
+        ProofFormatError
+            The content is not a sequence of records.
+        """
+        verdicts: list[str] = []
+        bounds: list[tuple[float, float] | None] = []
+        with self.refusing():
+            self._read_header()
+            roots = self._roots(records)
+            said, footer = self._said(records)
+            self._check_end(footer, said, records)
+            for own, leaves in zip(said, self._matched(said, roots), strict=True):
+                verdict, growth = self._verdict(own, leaves)
+                verdicts.append(verdict)
+                bounds.append(growth)
+        ok = not self.failures
+        return StabilityVerificationReport(
+            ok, tuple(self.failures), tuple(verdicts) if ok else (), tuple(bounds) if ok else (), self.report
+        )
+
+    # -- records ---------------------------------------------------------------------------------------------------
+
+    def _read_header(self) -> None:
+        header, problem = self.header, self.problem
+        if set(header) != _HEADER or header["format"] != "enumsol-proof" or not same(header["version"], PROOF_VERSION):
+            raise RefusedError("the first record is not the header of a proof of stability of this format")
+        if header["problem"] != problem.fingerprint or not same(header["p"], problem.p):
+            raise RefusedError("the proof belongs to another problem (its fingerprint is different)")
+        try:
+            self.body = BodyMotions(problem, self.mass)
+        except (InvalidArgumentError, InvalidProblemError) as error:
+            raise RefusedError(str(error)) from None
+        if header["mass"] != mass_fingerprint(self.body.mass):
+            raise RefusedError("the proof belongs to another mass (its fingerprint is different)")
+
+    def _roots(self, records: Iterator[Any]) -> list[list[Located]]:
+        """Places of the roots, by the proof that they are all."""
+        checker = self.checker
+        checker.enclosure, checker.located = enclosure_of(self.problem), {}
+        self.report = report = checker.run(SearchRecords(search_records(records)))
+        if report.failures:
+            self.failures += [f"roots: {failure}" for failure in report.failures]
+            raise RefusedError("the proof of the roots does not hold")
+        if report.data != "problem":
+            raise RefusedError("the roots are proven for S and g as computed only, which tells nothing of the body")
+        checker.locate_rational_roots()
+        roots = checker.located_roots()
+        if len(roots) != report.roots:
+            raise RefusedError(f"{report.roots} roots are proven, and places of {len(roots)} are known")
+        return roots  # type: ignore[no-any-return]
+
+    def _said(self, records: Iterator[Any]) -> tuple[list[_Said], Any]:
+        """What is said of each root, and the record after it."""
+        said: list[_Said] = []
+        for record in records:
+            if isinstance(record, dict):
+                return said, record
+            if is_certificate(record) and said:
+                said[-1].certificates.append(record)
+                continue
+            try:
+                point, verdict = root_from(record, self.problem.p * (1 + self.body.tangents))
+            except ValueError as error:
+                raise RefusedError(str(error)) from None
+            said.append(_Said(len(said), point, verdict, []))
+            if self.report is not None and len(said) > self.report.roots:
+                raise RefusedError(f"more is said than of the {self.report.roots} roots")
+        raise RefusedError("the end of the proof is missing")
+
+    def _check_end(self, footer: Any, said: list[_Said], records: Iterator[Any]) -> None:
+        counts = Counter(own.verdict for own in said)
+        if not same(footer, {"roots": len(said), **{verdict: counts[verdict] for verdict in VERDICTS}}):
+            raise RefusedError(f"the counts at the end, {quoted(footer)}, are not those of the records")
+        if next(records, _END) is not _END:
+            raise RefusedError("records follow after the end of the proof")
+
+    @staticmethod
+    def _matched(said: list[_Said], roots: list[list[Located]]) -> list[list[Located]]:
+        """Places of the root that every record is about: the nearest one to its forces."""
+        if len(said) != len(roots):
+            raise RefusedError(f"there are {counted(len(roots), 'root')}, and something is said of {len(said)}")
+        nearest = []
+        for own in said:
+            with np.errstate(over="ignore"):
+                away = [min(float(np.max(np.abs(leaf.forces.mid - own.point))) for leaf in leaves) for leaves in roots]
+            nearest.append(int(np.argmin(away)))
+        if len({*nearest}) != len(roots):
+            raise RefusedError("two records are about the same root")
+        return [roots[k] for k in nearest]
+
+    # -- roots -----------------------------------------------------------------------------------------------------
+
+    def _verdict(self, said: _Said, leaves: list[Located]) -> tuple[str, tuple[float, float] | None]:
+        """What is proven of a root, and bounds of the rate of a motion that grows."""
+        F = friction_over(self.problem, self.checker.alpha, self.checker.alpha)
+        known = next((found for leaf in leaves if (found := self._statuses(leaf, F)) is not None), None)
+        if said.verdict == UNDECIDED or known is None:
+            if said.verdict == UNDECIDED and said.certificates:
+                self.fail(f"root {said.number} is said to be undecided and has certificates")
+            return UNDECIDED, None
+        codes, forces = known
+        parts = list(self.body.settings([{code} for code in codes], F, forces))
+        given: list[list[Growing | NoMotion]] = [[] for _ in parts]
+        try:
+            for record in said.certificates:
+                k = part_of(record, len(parts))
+                given[k].append(certificate_from(record, len(parts[k].motions.signed)))
+        except ValueError as error:
+            self.fail(f"root {said.number}: {error}")
+            return UNDECIDED, None
+        if said.verdict == RUNS_AWAY:
+            return self._runs_away(said, parts, given)
+        for part, own in zip(parts, given, strict=True):
+            if (reason := _something_may_grow(part, own)) is not None:
+                self.fail(f"root {said.number}: {reason}")
+                return UNDECIDED, None
+        return DOES_NOT, None
+
+    def _runs_away(
+        self, said: _Said, parts: list[Setting], given: list[list[Growing | NoMotion]]
+    ) -> tuple[str, tuple[float, float] | None]:
+        named = [(part, own) for part, certificates in zip(parts, given, strict=True) for own in certificates]
+        part, growing = named[0] if len(named) == 1 else (None, None)
+        if part is None or not isinstance(growing, Growing):
+            self.fail(f"root {said.number} is said to run away without one motion that grows")
+            return UNDECIDED, None
+        found = growing.found(part.stiffness, part.motions)
+        if found is None:
+            self.fail(f"root {said.number}: no motion is proven to grow in the range that is named")
+            return UNDECIDED, None
+        low, high = found.mu
+        return RUNS_AWAY, (math.sqrt(low) * _BELOW, math.sqrt(high) * _ABOVE)
+
+    def _statuses(self, leaf: Located, F: list[Ball]) -> tuple[list[int], Floats | None] | None:
+        """What every node does, strictly, and in 3D bounds of lambda_t; None where it is not certain."""
+        p, forces = self.problem.p, leaf.forces
+        sides = [forces[(k + 1) * p : (k + 2) * p] for k in range(self.body.tangents)]
+        codes = []
+        for i in range(p):
+            pressure = float(forces.mid[i]) - float(forces.rad[i])
+            axes = [(f, side) for f, side in zip(F, sides, strict=True) if f.mid[i] > 0]
+            if leaf.open is not None and leaf.open[i]:
+                codes.append(OPEN)
+            elif not pressure > 0:
+                return None
+            elif not axes:
+                codes.append(STICK)
+            elif leaf.codes is not None and leaf.codes[i] not in (OPEN, STICK):
+                codes.append(leaf.codes[i])
+            elif _within(pressure, [(f[i], side[i]) for f, side in axes]):
+                codes.append(STICK)
+            else:
+                return None
+        if self.body.tangents == 1:
+            return codes, None
+        bounds = np.stack([np.stack([side.mid - side.rad, side.mid + side.rad], axis=1) for side in sides], axis=1)
+        # subtractions and additions were rounded
+        bounds[..., 0], bounds[..., 1] = np.nextafter(bounds[..., 0], -np.inf), np.nextafter(bounds[..., 1], np.inf)
+        return codes, bounds
+
+
+def _within(pressure: float, axes: list[tuple[Ball, Ball]]) -> bool:
+    """Whether a force is surely less than friction, lambda_n at least ``pressure`` and F > 0 along these axes."""
+    shares = []
+    for F, force in axes:
+        least = (float(F.mid) - float(F.rad)) * _BELOW
+        if not least > 0:
+            return False
+        shares.append((abs(float(force.mid)) + float(force.rad)) / least)
+    return math.hypot(*shares) * _ABOVE < pressure * _BELOW
+
+
+def _something_may_grow(part: Setting, given: list[Growing | NoMotion]) -> str | None:
+    """Why certificates do not show that nothing grows in a part of the body, or None."""
+    leaves = [leaf for leaf in given if isinstance(leaf, NoMotion)]
+    if len(leaves) < len(given):
+        return "a motion is named, and nothing is said to grow"
+    if not all(leaf.holds(part.stiffness, part.motions) for leaf in leaves):
+        return "a certificate does not exclude motions in its range"
+    ends = sorted({0.0, math.inf, *(leaf.low for leaf in leaves), *(leaf.high for leaf in leaves)})
+    for low, high in itertools.pairwise(ends):
+        if not _Ways().covered([leaf for leaf in leaves if leaf.low <= low and high <= leaf.high]):
+            return f"motions with growth rates from {math.sqrt(low):.3g} to {math.sqrt(high):.3g} are not excluded"
+    return None
+
+
+class _Ways:
+    """Ways in which nodes slide or stay in one range, looked at one after the other, as ``running_away.covers`` does.
+
+    A file could ask for any number of them.
+    """
+
+    def __init__(self) -> None:
+        self._left = _MOST_WAYS
+
+    def covered(
+        self, leaves: list[NoMotion], slides: frozenset[int] = frozenset(), stays: frozenset[int] = frozenset()
+    ) -> bool:
+        """True if every way is one that some leaf is about."""
+        self._left -= 1
+        if self._left < 0:
+            return False
+        fitting = [leaf for leaf in leaves if not stays & {*leaf.slides} and not slides & {*leaf.stays}]
+        if any(slides >= {*leaf.slides} and stays >= {*leaf.stays} for leaf in fitting):
+            return True
+        asked = [i for leaf in fitting for i in (*leaf.slides, *leaf.stays) if i not in slides and i not in stays]
+        if not asked:
+            return False
+        more = frozenset(asked[:1])
+        return self.covered(fitting, slides | more, stays) and self.covered(fitting, slides, stays | more)

@@ -1,0 +1,362 @@
+"""Proofs of which roots run away: honest ones are verified, and none that was changed states what is not so."""
+
+import copy
+import functools
+import json
+
+import numpy as np
+import pytest
+from generators import integer_problem
+from helpers.command_line import run
+from helpers.floating_space import known_body, plane_over_alpha
+from proof_tools import proof_of, records_of
+
+import enumsol
+from enumsol import ContactProblem, InvalidArgumentError, InvalidProblemError, gallery, verify
+from enumsol.checker import stability_checker
+from enumsol.search import stability as search
+from enumsol.trusted.running_away import NoMotion
+
+
+def gallery_problem(name, alpha):
+    return gallery.get(name).build(), alpha, None
+
+
+def strongly_coupled(seed, p=3):
+    """Nodes that slide or stick, all coupled, with friction so large that plain numbers often do not serve."""
+    rng = np.random.default_rng(seed)
+    n = 2 * p
+    X = rng.normal(size=(n, n))
+    A = X @ X.T + 0.2 * np.eye(n)
+    F = rng.choice([0.5, 1.0, 2.0], size=p)
+    slides, s = rng.random(p) < 0.8, rng.choice([-1.0, 1.0], size=p)
+    lam = np.concatenate([np.ones(p), np.where(slides, s, 0.4 * s) * F])
+    w = np.concatenate([np.zeros(p), np.where(slides, s * rng.uniform(0.2, 1, p), 0.0)])
+    rows = np.eye(n)
+    return ContactProblem(A, rows[:p], rows[p:], A @ w + lam, friction=F), 0.0, np.diag(rng.uniform(0.5, 2, n))
+
+
+def in_space(seed):
+    rng = np.random.default_rng(seed)
+    X = rng.normal(size=(7, 7))
+    A, F, angle = X @ X.T + 0.1 * np.eye(7), np.array([[3.0, 1.5], [1.5, 3.0]]), rng.uniform(-3, 3, 2)
+    d = np.stack([np.cos(angle), np.sin(angle)], axis=1)
+    lam = np.concatenate([np.ones(2), *(F * d).T])
+    w = np.concatenate([np.zeros(2), *(0.5 * d / F).T])
+    rows = np.eye(7)
+    f = A @ np.append(w, 0.3) + rows[:6].T @ lam
+    friction = F[:, 0], F[:, 1]
+    return enumsol.ContactProblem3D(A, rows[:2], rows[2:4], rows[4:6], f, friction=friction), 0.0, np.eye(7)
+
+
+def floating(seed):
+    problem = known_body(seed).problem
+    return problem, 1.0, np.eye(problem.n)
+
+
+def floating_in_the_plane(seed):
+    problem = plane_over_alpha(seed)
+    return problem, 0.0, np.eye(problem.n)
+
+
+def with_unit_mass(name, alpha):
+    problem = gallery.get(name).build()
+    return problem, alpha, np.eye(problem.n)
+
+
+PROBLEMS = {
+    "taper-8": lambda: gallery_problem("taper-8", 0.2),
+    "wedge-8-5": lambda: gallery_problem("wedge-8-5", 3.0),
+    "one-node-6.1": lambda: with_unit_mass("one-node-6.1", 5.0),
+    "two bodies": lambda: (gallery.chain(2), 5.0, np.eye(gallery.chain(2).n)),
+    **{f"floating {seed}": functools.partial(floating_in_the_plane, seed) for seed in (1, 3, 5)},
+    **{f"coupled {seed}": functools.partial(strongly_coupled, seed) for seed in range(4)},
+    **{f"in space {seed}": functools.partial(in_space, seed) for seed in (0, 2)},
+    "floating in space": functools.partial(floating, 105),
+}
+
+
+@functools.cache
+def known(name):
+    """A problem, its mass, its roots, and the records of the proof."""
+    problem, alpha, mass = PROBLEMS[name]()
+    roots = enumsol.enumerate_roots(problem, alpha)
+    return problem, mass, roots, records_of(roots.stability_proof(mass=mass))
+
+
+def checked(name, records):
+    problem, mass, *_ = known(name)
+    return verify(problem, proof_of(copy.deepcopy(records)), mass=mass)
+
+
+def certificates(records):
+    """Places of the records after the proof of the roots."""
+    end = next(k for k, record in enumerate(records) if k and isinstance(record, dict) and "leaves" in record)
+    return range(end + 1, len(records) - 1)
+
+
+@pytest.mark.parametrize("name", PROBLEMS)
+def test_honest_proofs(name):
+    _, _, roots, records = known(name)
+    report = checked(name, records)
+    assert report.ok, report.failures
+    assert report.verdicts == tuple(found.verdict for found in roots.verdicts)
+    for found, bounds in zip(roots.verdicts, report.bounds, strict=True):
+        assert (bounds is None) == (found.verdict != "runs away")
+        assert bounds is None or bounds[0] <= found.growth_rates[0] <= bounds[1]
+    assert report.complete == (roots.complete and "undecided" not in report.verdicts)
+    assert repr(report).startswith("proof: verified for the stability of")
+
+
+def test_what_is_verified_is_not_little():
+    """Of these problems some roots run away, some do not, and some need more than plain numbers."""
+    verdicts = [verdict for name in PROBLEMS for verdict in checked(name, known(name)[3]).verdicts]
+    assert min(map(verdicts.count, ("runs away", "does not run away"))) >= 6
+    assert verdicts.count("undecided") <= 2
+
+
+@pytest.mark.parametrize("seed", [32, 35, 58])
+def test_degenerate_roots_stay_undecided(seed):
+    problem = integer_problem(np.random.default_rng(seed), 2)
+    roots = enumsol.enumerate_roots(problem, 0.0)
+    mass = np.eye(problem.n)
+    found, report = roots.stability(mass=mass), verify(problem, roots.stability_proof(mass=mass), mass=mass)
+    assert report.ok, report.failures
+    assert {own.verdict for own in found} == {"does not run away"}
+    assert set(report.verdicts) == {"undecided"}
+    assert not report.complete
+    # and whatever is said of them, without any certificate
+    records = records_of(roots.stability_proof(mass=mass))
+    for verdict in ("runs away", "does not run away"):
+        forged = [
+            [*record[:2], verdict] if isinstance(record, list) and record[0] == "v" else record
+            for record in records[:-1]
+        ]
+        counts = {"runs away": 0, "does not run away": 0, "undecided": 0, verdict: len(roots)}
+        said = verify(problem, proof_of([*forged, {"roots": len(roots), **counts}]), mass=mass)
+        assert said.ok
+        assert set(said.verdicts) == {"undecided"}
+
+
+# -- forgeries ---------------------------------------------------------------------------------------------------------
+
+
+def changed(rng, value):
+    """A number, text or list of a record, changed."""
+    if isinstance(value, bool) or value is None:
+        return [0.5, 1e300, "x", []][rng.integers(4)]
+    if isinstance(value, str):
+        return ["runs away", "does not run away", "undecided", "n", "g", "v", ""][rng.integers(7)]
+    if isinstance(value, (int, float)):
+        choices = [-value, value + 1, value * float(np.exp(rng.normal())), 0, 1e300, None, value * (1 + 1e-9), "1"]
+        return choices[rng.integers(len(choices))]
+    if isinstance(value, list) and value and rng.random() < 0.8:
+        at = int(rng.integers(len(value)))
+        return [*value[:at], changed(rng, value[at]), *value[at + 1 :]]
+    return [[], [0], [*value, *value], value[:-1]][rng.integers(4)] if isinstance(value, list) else value
+
+
+def mutant(rng, records):
+    """The records with one of the certificates changed, left out, doubled, or put elsewhere."""
+    records = copy.deepcopy(records)
+    places = certificates(records)
+    k, m = (int(places[rng.integers(len(places))]) for _ in range(2))
+    way = rng.random()
+    if way < 0.7:
+        at = int(rng.integers(len(records[k])))
+        records[k][at] = changed(rng, records[k][at])
+    elif way < 0.8:
+        del records[k]
+    elif way < 0.9:
+        records[k], records[m] = records[m], records[k]
+    else:
+        records.insert(m, records[k])
+    if rng.random() < 0.7:
+        said = [
+            records[k][2] for k in certificates(records) if records[k] and records[k][0] == "v" and len(records[k]) > 2
+        ]
+        counts = {verdict: said.count(verdict) for verdict in ("runs away", "does not run away", "undecided")}
+        records[-1] = {"roots": len(said), **counts}
+    return records
+
+
+def states_nothing_false(name, count, seed):
+    """Mutants of one proof; how many of them were refused."""
+    rng = np.random.default_rng(seed)
+    _, _, _, records = known(name)
+    truth = checked(name, records).verdicts
+    refused = 0
+    for _ in range(count):
+        report = checked(name, mutant(rng, records))
+        refused += not report.ok
+        allowed = [{verdict, "undecided"} for verdict in truth]
+        # records may follow each other in any order
+        if report.ok and len(report.verdicts) == len(truth):
+            assert sorted(report.verdicts) == sorted(truth) or all(
+                verdict in either for verdict, either in zip(report.verdicts, allowed, strict=True)
+            )
+        else:
+            assert not report.ok
+            assert not report.verdicts
+            assert "REFUSED" in repr(report)
+    return refused
+
+
+MUTATED = ["one-node-6.1", "coupled 1", "coupled 3", "in space 0", "floating 5"]
+
+
+@pytest.mark.parametrize("name", MUTATED)
+def test_forty_mutants(name):
+    assert states_nothing_false(name, 8, 1) >= 4
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("name", MUTATED)
+def test_three_hundred_mutants(name):
+    assert states_nothing_false(name, 60, 2) >= 30
+
+
+def of_root(records, number):
+    """Places of the records about one root, its own first."""
+    places = certificates(records)
+    first = [k for k in places if records[k][0] == "v"]
+    return range(first[number], [*first, places[-1] + 1][number + 1])
+
+
+def number_of(name, verdict):
+    return known(name)[2].verdicts.index(next(v for v in known(name)[2].verdicts if v.verdict == verdict))
+
+
+def refusal(name, records):
+    report = checked(name, records)
+    assert not report.ok
+    assert not report.complete
+    return "; ".join(report.failures)
+
+
+def test_swapped_verdicts():
+    records = copy.deepcopy(known("taper-8")[3])
+    for k in certificates(records):
+        if records[k][0] == "v":
+            records[k][2] = "runs away" if records[k][2] == "does not run away" else "does not run away"
+    counts = records[-1]
+    counts["runs away"], counts["does not run away"] = counts["does not run away"], counts["runs away"]
+    assert "run away without one motion" in refusal("taper-8", records)
+
+
+@pytest.mark.parametrize("name", ["taper-8", "wedge-8-5"])
+def test_certificates_of_another_root(name):
+    """The point of a root with the verdict and certificates of another one."""
+    records = copy.deepcopy(known(name)[3])
+    away, not_away = (of_root(records, number_of(name, v)) for v in ("runs away", "does not run away"))
+    first, other = records[away[0]], records[not_away[0]]
+    first[1], other[1] = other[1], first[1]
+    assert "root" in refusal(name, records)
+
+
+def test_ranges_with_gaps_and_without_an_end():
+    name = "taper-8"
+    records = known(name)[3]
+    of_roots = (of_root(records, number) for number in range(3))
+    places = next(own for own in ([k for k in of if records[k][0] == "n"] for of in of_roots) if len(own) > 1)
+    for k in places:
+        assert "are not excluded" in refusal(name, [*records[:k], *records[k + 1 :]])
+    last = next(k for k in places if records[k][3] is None)
+    for end in (1e9, 0.0, records[last][2]):
+        ended = copy.deepcopy(records)
+        ended[last][3] = end
+        assert "exclude" in refusal(name, ended)
+    first = next(k for k in places if records[k][2] == 0.0)
+    late = copy.deepcopy(records)
+    late[first][2] = 1e-12
+    assert "exclude" in refusal(name, late)
+    without = [record for k, record in enumerate(records) if k not in places]
+    assert "are not excluded" in refusal(name, without)
+
+
+def test_another_mass_and_another_problem():
+    problem, mass, roots, records = known("one-node-6.1")
+    proof = proof_of(records)
+    assert "another mass" in verify(problem, proof, mass=2 * mass).failures[0]
+    assert not verify(problem, proof).ok
+    other = problem.replace(f=np.asarray(problem.f) + 1)
+    assert "another problem" in verify(other, proof, mass=mass).failures[0]
+    # a fingerprint that was changed with it proves nothing
+    forged = [records[0] | {"problem": other.fingerprint}, *records[1:]]
+    assert "roots: " in verify(other, proof_of(forged), mass=mass).failures[0]
+    with pytest.raises(InvalidProblemError, match="mass"):
+        verify(problem, proof, mass=-mass)
+    with pytest.raises(InvalidArgumentError, match="nothing of stability"):
+        verify(problem, roots.proof, mass=mass)
+
+
+def test_too_many_or_too_few_roots_and_footers():
+    name = "one-node-6.1"
+    records = known(name)[3]
+    own = of_root(records, 0)
+    twice = [*records[: own[-1] + 1], *records[own[0] : own[-1] + 1], *records[own[-1] + 1 :]]
+    assert "more is said" in refusal(name, twice)
+    assert "counts" in refusal(name, [*records[: own[0]], *records[own[-1] + 1 :]])
+    less = [*records[: own[0]], *records[own[-1] + 1 :]]
+    counts = [less[k][2] for k in certificates(less) if less[k][0] == "v"]
+    less[-1] = {"roots": 2, **{v: counts.count(v) for v in ("runs away", "does not run away", "undecided")}}
+    assert "something is said of 2" in refusal(name, less)
+    assert "missing" in refusal(name, records[:-1])
+    assert "follow" in refusal(name, [*records, records[-1]])
+    assert "header" in refusal(name, [records[0] | {"more": 1}, *records[1:]])
+
+
+def test_a_file_that_asks_for_too_many_ways(monkeypatch):
+    """All ways of five nodes, one by one; where they are too many, nothing is concluded from them."""
+    zero = np.zeros((5, 5))
+    ways = [[k for k in range(5) if number >> k & 1] for number in range(32)]
+    decided = [(tuple(own), tuple(k for k in range(5) if k not in own)) for own in ways]
+    leaves = [NoMotion(0.0, 1.0, None, *own, zero, (zero, zero)) for own in decided]
+    assert stability_checker._Ways().covered(leaves)
+    assert not stability_checker._Ways().covered(leaves[:-1])
+    monkeypatch.setattr(stability_checker, "_MOST_WAYS", 62)
+    assert not stability_checker._Ways().covered(leaves)
+    monkeypatch.setattr(stability_checker, "_MOST_WAYS", 63)
+    assert stability_checker._Ways().covered(leaves)
+
+
+# -- who writes them ---------------------------------------------------------------------------------------------------
+
+
+def test_roots_without_a_proof(monkeypatch, tmp_path):
+    problem, mass, roots, _ = known("one-node-6.1")
+    fast = enumsol.enumerate_roots(problem, 5.0, arithmetic="fast")
+    with pytest.raises(InvalidArgumentError, match="fast arithmetic"):
+        fast.stability_proof(mass=mass)
+    place = tmp_path / "stability.proof"
+    proof = roots.stability_proof(place, mass=mass)
+    assert verify(problem, enumsol.Proof.load(place), mass=mass).complete
+    assert proof.content() == place.read_bytes()
+    monkeypatch.setattr(search.StabilitySearch, "run", lambda self: search.Proven((), (), ((0.0, np.inf),)))
+    unknown = verify(problem, roots.stability_proof(mass=mass), mass=mass)
+    assert unknown.ok
+    assert not unknown.complete
+    assert set(unknown.verdicts) == {"undecided", "does not run away"} or set(unknown.verdicts) == {"undecided"}
+
+
+def test_command_line(capsys, tmp_path):
+    """The proof of the roots and of their verdicts takes the place of that of the roots alone."""
+    problem, place = tmp_path / "taper.npz", tmp_path / "taper.proof"
+    enumsol.write_problem(known("taper-8")[0], problem)
+    status, out, _ = run(capsys, "roots", problem, "--alpha", "0.2", "--stability", "--proof", place, "--quiet")
+    assert status == 0, out
+    status, out, _ = run(capsys, "verify", problem, place)
+    assert status == 0
+    assert "root 1: runs away" in out
+    status, _, err = run(
+        capsys, "roots", problem, "--alpha", "0.2", "--stability", "--proof", place, "--resume", "--quiet"
+    )
+    assert status == 2
+    assert "is a proof of another kind, 'stability'" in err
+    other = tmp_path / "other.npz"
+    enumsol.write_problem(known("one-node-6.1")[0], other)
+    status, out, _ = run(capsys, "verify", other, place)
+    assert status == 2
+    assert "another problem" in out
+    status, out, _ = run(capsys, "verify", problem, place, "--json", "-")
+    assert json.loads(out)["verdicts"] == ["does not run away", "runs away", "does not run away"]
