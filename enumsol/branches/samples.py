@@ -18,7 +18,7 @@ from enumsol.model.problem import ContactProblem, check_is_problem
 from enumsol.model.statuses import STATUSES, ContactStatus
 from enumsol.roots.enumerate import enumerate_roots
 from enumsol.roots.local_branch import ratios
-from enumsol.support.arguments import alpha_list, even_alphas, optional_callable, optional_executor
+from enumsol.support.arguments import alpha_list, even_alphas, one_of, optional_callable, optional_executor
 from enumsol.support.deadlines import keeping
 from enumsol.support.messages import counted
 from enumsol.support.workers import spread, workers_of
@@ -36,6 +36,8 @@ if TYPE_CHECKING:
     from enumsol.support.array_types import Alpha, AlphaLike, Floats
 
 
+#: Solutions that tables and maps can leave out, and the columns that tell how many they are, and how many may be.
+RUNNING_AWAY, _LEFT_OUT = "running away", ("left_out", "stability_undecided")
 #: Attributes of a root that are those of its node, too.
 _SHOWN = ("statuses", "lambda_n", "lambda_t", "index")
 
@@ -286,6 +288,7 @@ def multiplicity_table(
     *,
     samples: int | None = None,
     arithmetic: str = "verified",
+    without: str | None = None,
     executor: Executor | None = None,
     jobs: int | None = None,
     progress: Callable[[int, int], object] | None = None,
@@ -302,6 +305,9 @@ def multiplicity_table(
         to the decimals, where numpy.linspace(-1, 0.2, 7) has -1.1e-16 for 0.
     arithmetic : str
         Of ``enumerate_roots``.
+    without : "running away", optional
+        Leave out the isolated roots that are proven to run away (see `stability`; the problem needs a mass or a mesh).
+        Undecided ones are counted as roots.
     executor : concurrent.futures.Executor, optional
         Enumerates at several alphas at a time: a process pool, or the Client of a dask cluster.
     jobs : int, optional
@@ -318,13 +324,15 @@ def multiplicity_table(
         with_slip_minus, or in 3D with_slip (isolated roots at which at least one node has the status); index_sum
         (missing where a degree is not known), complete, undecided, stopped (why the search ended early, or missing),
         nodes of the search, and seconds. Where a search was cut short or left something undecided, the counts are
-        those of what was found, and so lower bounds. ``attrs["held"]`` says whether supports or springs hold the body:
-        if not, the indices may have any sum.
+        those of what was found, and so lower bounds. With ``without`` also left_out, the number of roots that run away,
+        and stability_undecided; index_sum is that of all roots all the same. ``attrs["held"]`` says whether supports or
+        springs hold the body: if not, the indices may have any sum.
 
     Raises
     ------
     InvalidArgumentError
-        ``alphas`` is one number, an alpha is not a finite number, or makes a friction coefficient negative.
+        ``alphas`` is one number, an alpha is not a finite number, or makes a friction coefficient negative; or
+        ``without`` is something else, or there is no mass for it.
     Interrupted, OutOfMemoryError
         On Ctrl-C, or where the memory does not suffice; ``partial`` is the table of what was done.
 
@@ -342,7 +350,9 @@ def multiplicity_table(
     chosen = alpha_list(alphas) if samples is None else even_alphas(alphas, samples)
     for alpha in chosen:
         problem.friction_at(alpha)
-    row = partial(table_row, problem, {"arithmetic": arithmetic, **options})
+    if without is not None:
+        check_without(without, problem)
+    row = partial(table_row, problem, {"arithmetic": arithmetic, **options}, without=without)
     done: dict[int, dict[str, Any]] = {}
 
     def work() -> pd.DataFrame:
@@ -368,7 +378,8 @@ def _frame(problem: AnyProblem, done: dict[int, dict[str, Any]]) -> pd.DataFrame
     """Rows in the order of their places."""
     import pandas as pd
 
-    counts = ["alpha", "roots", "families", *kinds_of(problem).values(), "index_sum"]
+    told = [name for name in _LEFT_OUT if any(name in row for row in done.values())]
+    counts = ["alpha", "roots", *told, "families", *kinds_of(problem).values(), "index_sum"]
     columns = [*counts, "complete", "undecided", "stopped", "nodes", "seconds"]
     table = pd.DataFrame([done[k] for k in sorted(done)], columns=columns)
     table = table.astype({"index_sum": "Int64"})  # whole numbers, and missing ones
@@ -376,13 +387,33 @@ def _frame(problem: AnyProblem, done: dict[int, dict[str, Any]]) -> pd.DataFrame
     return table
 
 
-def table_row(problem: AnyProblem, options: dict[str, Any], alpha: Alpha) -> dict[str, Any]:
+def check_without(without: str, problem: AnyProblem) -> None:
+    """Refuse what cannot be left out of the solutions of a problem.
+
+    Raises
+    ------
+    InvalidArgumentError
+        It is no name of such solutions, or there is no mass to tell them by.
+    """
+    from enumsol.roots.stability import Stabilities  # sparse graphs and solvers come with it
+
+    one_of(without, "without", (RUNNING_AWAY,))
+    Stabilities(problem)
+
+
+def table_row(
+    problem: AnyProblem, options: dict[str, Any], alpha: Alpha, *, without: str | None = None
+) -> dict[str, Any]:
     """Row of the table (a module-level function, so that other processes can import it)."""
     roots = enumerate_roots(problem, alpha, **options)
-    counts = kinds(roots)
+    verdicts = [found.verdict for found in roots.stability()] if without is not None else [""] * len(roots)
+    counted_ones = [root for root, verdict in zip(roots, verdicts, strict=True) if verdict != "runs away"]
+    counts = kinds(counted_ones)
+    left_out = (verdicts.count("runs away"), verdicts.count("undecided"))
     return {
         "alpha": float(alpha),
-        "roots": len(roots),
+        "roots": len(counted_ones),
+        **(dict(zip(_LEFT_OUT, left_out, strict=True)) if without is not None else {}),
         "families": len(roots.families),
         **{name: counts[status] for status, name in kinds_of(problem).items()},
         "index_sum": roots.index_sum,
@@ -399,6 +430,6 @@ def kinds_of(problem: AnyProblem) -> Mapping[ContactStatus, str]:
     return _KINDS if isinstance(problem, ContactProblem) else _KINDS_3D
 
 
-def kinds(roots: RootSet) -> Counter[ContactStatus]:
+def kinds(roots: Iterable[Root]) -> Counter[ContactStatus]:
     """For every status the number of isolated roots at which some node has it."""
     return Counter(status for root in roots for status in set(root.statuses))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import shlex
+import time
 from importlib.util import find_spec
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
@@ -11,16 +12,22 @@ import typer
 from enumsol.cli import common, options, output
 from enumsol.cli.common import load_problem, node_row, parse_interval, so_far, title_of, units_of
 from enumsol.cli.progress import Display
-from enumsol.errors import InvalidArgumentError, MissingDependencyError
+from enumsol.errors import Interrupted, InvalidArgumentError, MissingDependencyError
 
 if TYPE_CHECKING:
+    from collections.abc import Callable
+
     from enumsol.branches import BranchGraph
+    from enumsol.errors import EnumsolError
     from enumsol.model.problem3d import AnyProblem
     from enumsol.support.array_types import Alpha
 
 
 #: Quantities of a figure: overviews, and those of nodes.
 Overview = Literal["norm", "sum_n", "sum_t", "lambda_n", "lambda_t", "u_n", "u_t"]
+
+#: Asked for, refused, or neither.
+Stability = Annotated[bool | None, typer.Option("--stability/--no-stability")]
 
 
 def graph(
@@ -30,6 +37,7 @@ def graph(
     arithmetic: options.Arithmetic = "verified",
     max_nodes: options.Count | None = None,
     time_limit: options.Seconds | None = None,
+    stability: Stability = None,
     jobs: options.Count = 1,
     save_file: options.OutputFile | None = None,
     json_file: options.OutputFile | None = None,
@@ -55,6 +63,8 @@ def graph(
     ----------
     arithmetic : verified: rigorous error bounds, with proof. fast: the search trusts floats, never proven. exact:
         rationals throughout, with proof, slow beyond ten contact nodes.
+    stability : Say which arcs run away, however long it takes; by default in 2D, where PROBLEM has a mesh or a mass, if
+        that takes less than a tenth of the time of the graph.
     save_file : Write the graph, for enumsol audit and follow.
     csv_file : Write a table with one row per arc; - is stdout.
     proof_file : Write the proof (verified), for enumsol verify.
@@ -73,7 +83,7 @@ def graph(
     if chosen is not None and quantity in ("norm", "sum_n", "sum_t"):
         raise InvalidArgumentError(f"--nodes is given with --quantity {quantity}; expected a quantity of nodes")
     limits = {"max_nodes": max_nodes, "time_limit": time_limit}
-    found, ended = so_far(lambda: build(body, interval, arithmetic, jobs, **limits))
+    found, ended = _told(body, stability, lambda: build(body, interval, arithmetic, jobs, **limits))
     output.deliver(
         (proof_file, lambda path: write_proof(found, path)),
         (save_file, found.save),
@@ -98,6 +108,7 @@ def report(
     arithmetic: options.Arithmetic = "verified",
     max_nodes: options.Count | None = None,
     time_limit: options.Seconds | None = None,
+    stability: Stability = None,
     jobs: options.Count = 1,
     title: options.Title | None = None,
     units: options.Units | None = None,
@@ -118,13 +129,14 @@ def report(
     page_file : File of the page, .html.
     arithmetic : verified: rigorous error bounds, with proof. fast: the search trusts floats, never proven. exact:
         rationals throughout, with proof, slow beyond ten contact nodes.
+    stability : As enumsol graph.
     proof_file : Write the proof (verified), to pass on with the page.
     """
     if find_spec("plotly") is None:
         raise MissingDependencyError.of("reports", "plotly", "report")
     interval, body, names = parse_interval(first, last), load_problem(problem), units_of(problem, units)
     limits = {"max_nodes": max_nodes, "time_limit": time_limit}
-    found, ended = so_far(lambda: build(body, interval, arithmetic, jobs, **limits))
+    found, ended = _told(body, stability, lambda: build(body, interval, arithmetic, jobs, **limits))
 
     def write(path: str) -> None:
         from enumsol.report import write_report  # numpy: not for --help
@@ -181,6 +193,40 @@ def build(
     told = lambda stage, share: (share, *_STEPS[stage])  # noqa: E731
     with common.workers(jobs) as executor, Display("branch graph", told=told) as display:
         return branch_graph(problem, interval, arithmetic, progress=display, executor=executor, **limits)
+
+
+#: The time for verdicts that nobody asked for, as a share of the time of the graph.
+_SHARE = 0.1
+
+
+def _told(
+    problem: AnyProblem, stability: bool | None, search: Callable[[], BranchGraph]
+) -> tuple[BranchGraph, EnumsolError | None]:
+    """A graph with its verdicts: those that were asked for, or those that hardly take time; and what ended it."""
+    from enumsol.branches.stability import ArcStabilities  # numpy: not for --help
+    from enumsol.support.deadlines import Deadline, TimeOverError, within
+
+    if stability:
+        ArcStabilities(problem)  # refused before the search
+    found, ended = so_far(search)
+    if ended is not None or stability is False or not (stability or _has_mass(problem)):
+        return found, ended
+    limit = None if stability else _SHARE * found.stats.seconds
+    try:
+        with Display("stability"), within(Deadline.after(time.perf_counter(), limit)):
+            found.stability()
+    except TimeOverError:
+        common.note("which arcs run away takes more than a tenth of the time of the graph; --stability finds it")
+    except KeyboardInterrupt:
+        ended = Interrupted("the search for verdicts was interrupted", found)
+    return found, ended
+
+
+def _has_mass(problem: AnyProblem) -> bool:
+    """Whether verdicts on arcs can be found without more data."""
+    from enumsol.model.problem import ContactProblem  # numpy: not for --help
+
+    return isinstance(problem, ContactProblem) and (problem.mass is not None or problem.mesh is not None)
 
 
 def read_graph(file: str, problem: AnyProblem) -> BranchGraph:

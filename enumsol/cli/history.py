@@ -27,7 +27,8 @@ def history(
     problem: Problem,
     steps: Annotated[str | None, typer.Option(metavar="STEPS", show_default=False)] = None,
     arithmetic: Arithmetic = "verified",
-    follow: Literal["all", "nearest"] = "all",
+    follow: Literal["all", "nearest", "not running away"] = "all",
+    stability: bool = False,
     merge: Annotated[float | None, typer.Option(metavar="LENGTH", show_default=False)] = None,
     refine: bool = False,
     max_branches: Count | None = None,
@@ -62,7 +63,8 @@ def history(
         the key steps of a .toml PROBLEM.
     arithmetic : verified: rigorous error bounds, with proof. fast: floats and a tolerance, never proven. exact:
         rationals throughout, for small problems in 2D.
-    follow : Which roots of a step start the next one: all, or the nearest.
+    follow : Which roots of a step start the next one: all, the nearest, or all but those that run away.
+    stability : Say at every step how many roots run away; PROBLEM has a mesh or a mass.
     merge : Join ends whose contact nodes are at most this far apart.
     refine : Halve the increments until the statuses no longer change.
     max_branches : Follow at most N different ends of a step.
@@ -79,6 +81,8 @@ def history(
     limits = {"max_branches": max_branches, "max_nodes": max_nodes, "time_limit": time_limit}
     options = {"arithmetic": arithmetic, "follow": follow, "merge": merge, "refine": refine, **limits}
     found, ended = common.so_far(lambda: _search(body, given, jobs, options))
+    if stability and ended is None:
+        found.stability()
 
     def write_page(path: str) -> None:
         from enumsol.report import write_report  # numpy: not for --help

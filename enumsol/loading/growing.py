@@ -35,7 +35,7 @@ from enumsol.roots.enumerate import enumerate_roots
 from enumsol.roots.root import Root
 from enumsol.search.outcome import Stop, StopReason
 from enumsol.support import arguments
-from enumsol.support.deadlines import keeping
+from enumsol.support.deadlines import Deadline, TimeOverError, keeping, within
 from enumsol.support.messages import counted
 from enumsol.support.workers import workers_of
 
@@ -45,6 +45,7 @@ if TYPE_CHECKING:
     from enumsol.loading.history_data import Node
     from enumsol.model.problem3d import AnyProblem
     from enumsol.roots.root_set import RootSet
+    from enumsol.roots.stability import Stability
     from enumsol.support.array_types import Alpha
     from enumsol.support.deadlines import Ending
 
@@ -56,6 +57,8 @@ if TYPE_CHECKING:
 
 #: Advice on a step in 3D whose start is not known closely enough.
 _CURE = "change the load of this step slightly, or hold the body by stiffer springs"
+#: Of ``follow``: all roots but those that run away.
+_RESTING = "not running away"
 #: Histories that are compared at most.
 _MOST = 20_000
 
@@ -182,9 +185,11 @@ def histories(
         Of `enumerate_roots`. "verified": starts are known as balls, and a step is complete only if it is so for every
         start in its ball. "exact": starts are rationals (2D only). "fast" proves nothing, and a body that nothing
         holds does not have it.
-    follow : {"all", "nearest"} or callable
-        Which roots start the next step. "nearest": the one whose contact nodes are nearest to where the step began. A
-        callable gets the root before (None in the first step) and the RootSet, and returns roots or their numbers.
+    follow : {"all", "nearest", "not running away"} or callable
+        Which roots start the next step. "nearest": the one whose contact nodes are nearest to where the step began.
+        "not running away": all but those that are proven to run away (see `stability`; the problem needs a mass or a
+        mesh). Undecided ones are followed, and the printed history names them. A callable gets the root before (None in
+        the first step) and the RootSet, and returns roots or their numbers.
     merge : float, optional
         Roots of a step whose contact nodes are nowhere further apart than this [length] start one stage together, from
         a ball that holds both ends (from the first of both in fast arithmetic). By default, and in exact arithmetic,
@@ -246,7 +251,11 @@ def histories(
     check_is_problem(given)
     arguments.one_of(arithmetic, "arithmetic", ("fast", "verified", "exact"))
     if not callable(follow):
-        arguments.one_of(follow, "follow", ("all", "nearest"))
+        arguments.one_of(follow, "follow", ("all", "nearest", _RESTING))
+        if follow == _RESTING:
+            from enumsol.roots.stability import Stabilities  # sparse graphs and solvers come with it
+
+            Stabilities(problem)  # refused before the search
     tolerance = None if merge is None else arguments.nonnegative_number(merge, "merge")
     if tolerance is not None and arithmetic == "exact":
         raise InvalidArgumentError('merge is given with arithmetic "exact", in which only equal ends are merged')
@@ -347,6 +356,9 @@ class _Growing:
             waiting = self._step(number, step, waiting)
             if not waiting:
                 break
+        if self.follow == _RESTING:
+            for stage in self.stages:
+                self._verdicts(stage)
         return self.history()
 
     @property
@@ -432,9 +444,10 @@ class _Growing:
     def _ends(self, stage: Stage, item: _Waiting, nodes: list[Node], following: list[_Waiting]) -> None:
         """Add where the followed roots of a stage leave the contact nodes to the starts of the next step."""
         chosen = self._chosen(stage, item)
+        why = "it runs away" if self.follow == _RESTING else "by the user's choice"
         for k, (root, node) in enumerate(zip(stage.roots, nodes, strict=True)):
             if k not in chosen:
-                self.reasons.append(f"step {stage.step}: root {named(node)} is not followed, by the user's choice")
+                self.reasons.append(f"step {stage.step}: root {named(node)} is not followed, {why}")
                 continue
             case = case_of(stage, root)
             start = self.ends.get(case) if case is not None else None
@@ -465,6 +478,9 @@ class _Growing:
         roots = stage.roots
         if self.follow == "all" or not len(roots):
             return set(range(len(roots)))
+        if self.follow == _RESTING:
+            verdicts = self._verdicts(stage)
+            return {k for k in range(len(roots)) if verdicts is None or verdicts[k].verdict != "runs away"}
         before = self._root(item.parents[0]) if item.parents else None
         if self.follow == "nearest":
             start = np.zeros(len(contact_displacements(stage.problem, roots[0])))
@@ -474,6 +490,14 @@ class _Growing:
             return {int(np.argmin(far))}
         assert callable(self.follow)
         return _numbers(self.follow(before, roots), roots)
+
+    def _verdicts(self, stage: Stage) -> Sequence[Stability] | None:
+        """The verdicts on the roots of a stage, or None where the time is over."""
+        try:
+            with within(Deadline.after(self.limits.started, self.limits.seconds)):
+                return stage.roots.stability()
+        except TimeOverError:
+            return None
 
     def _root(self, node: Node) -> Root:
         stage = next(s for s in self.stages if node in self.node_of[s.number])

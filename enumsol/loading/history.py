@@ -34,9 +34,11 @@ if TYPE_CHECKING:
     from pathlib import Path
 
     import pandas as pd
+    import scipy.sparse as sp
 
     from enumsol.model.problem3d import AnyProblem
-    from enumsol.support.array_types import Alpha, Floats
+    from enumsol.roots.stability import Stability
+    from enumsol.support.array_types import Alpha, ArrayLike, Floats
 
 FORMAT, VERSION = "enumsol-history", 3
 _ARRAYS = ("lambda_n", "lambda_t", "u_n", "u_t")
@@ -403,6 +405,32 @@ class History(Immutable):
         """The work of friction from the start to every node, least and most over the histories that lead there."""
         return self.data.dissipated
 
+    def stability(
+        self, *, mass: ArrayLike | sp.sparray | sp.spmatrix | None = None
+    ) -> Mapping[history_data.Node, Stability]:
+        """Which roots run away, by their nodes (see `enumsol.stability`).
+
+        Printed histories, tables and pages say it at every step from then on, for the last mass that was asked for.
+
+        Parameters
+        ----------
+        mass : (n, n) array_like or sparse, optional
+            By default that of the problem.
+
+        Raises
+        ------
+        InvalidArgumentError, InvalidProblemError
+            As `enumsol.stability`.
+        """
+        for stage in self.data.stages:
+            stage.roots.stability(mass=mass)
+        return self.verdicts or {}
+
+    @property
+    def verdicts(self) -> Mapping[history_data.Node, Stability] | None:
+        """What `stability` found last, or None."""
+        return self.data.verdicts
+
     # -- results ---------------------------------------------------------------------------------------------------
 
     def to_frame(self) -> pd.DataFrame:
@@ -411,8 +439,9 @@ class History(Immutable):
         ``lambda_n`` and ``lambda_t`` (in 3D lambda_t1, lambda_t2) are sums over the contact nodes, ``dissipated`` is
         the work of friction in the step, ``dissipated_least`` and ``dissipated_most`` that since the start,
         ``radius`` how far the start of the step may be from its midpoint, and ``followed`` tells whether a next step
-        begins here.
+        begins here. Once `stability` was asked for, ``stability`` is the verdict.
         """
+        verdicts = self.verdicts
         import pandas as pd
 
         rows = []
@@ -432,6 +461,7 @@ class History(Immutable):
                     "contact": summary(root.statuses),
                     "index": root.index,
                     "regular": root.regular,
+                    **({} if verdicts is None else {"stability": verdicts[node].verdict}),
                     "lambda_n": float(np.sum(root.lambda_n)),
                     **dict(zip(names, np.atleast_1d(shear).tolist(), strict=True)),
                     "dissipated": given["dissipated"],

@@ -28,12 +28,13 @@ from enumsol.support.plotting import in_units
 from enumsol.trusted.positions import certain_statuses, tangential_positions
 
 if TYPE_CHECKING:
-    from collections.abc import Hashable, Iterator, Mapping
+    from collections.abc import Hashable, Iterator, Mapping, Sequence
 
     from enumsol.loading.steps import LoadStep
     from enumsol.model.problem3d import AnyProblem
     from enumsol.proof.proof_file import Proof
     from enumsol.roots.root_set import RootSet
+    from enumsol.roots.stability import Stability, Verdict
     from enumsol.support.array_types import Floats
 
 
@@ -275,6 +276,18 @@ class HistoryData:
                 graph.add_edges_from((parent, node) for parent in parents or (START,))
         return nx.freeze(graph)
 
+    @property
+    def verdicts(self) -> Mapping[Node, Stability] | None:
+        """The verdicts on all nodes, or None where those of some are not known."""
+        nodes = iter(node for node in self.graph if node != START)
+        found: dict[Node, Stability] = {}
+        for stage in self.stages:
+            verdicts = stage.roots.verdicts if len(stage.roots) else ()
+            if verdicts is None:
+                return None
+            found.update((node, verdict) for verdict, node in zip(verdicts, nodes, strict=False))
+        return MappingProxyType(found)
+
     def stages_of(self, step: int) -> tuple[Stage, ...]:
         """The searches of one step, from 1."""
         return tuple(stage for stage in self.stages if stage.step == step)
@@ -396,6 +409,8 @@ def _following(data: HistoryData) -> list[list[int]]:
 _LINES, _REASONS = 40, 8
 #: How the line of a node below a branching begins, and the lines below it; of the last one otherwise.
 _BRANCH = {True: ("└─ ", "   "), False: ("├─ ", "│  ")}
+#: What is said of a node by its verdict.
+_TOLD = {"does not run away": "", "runs away": " (runs away)", "undecided": " (running away undecided)"}
 _HEADS = ("step", "alpha", "roots", "from", "histories", "dissipated")
 
 
@@ -403,8 +418,8 @@ def history_text(history: HistoryData, units: tuple[str, str] | None = None) -> 
     """Text that print shows, with units of forces and lengths if they are given."""
     heads, body = steps_table(history, units)
     rows = [heads, *body]
-    widths = (4, 10, 6, 5, 10, max(11, len(heads[-1])))
-    table = [" ".join(f"{cell:>{width}}" for cell, width in zip(row, widths, strict=True)) for row in rows]
+    widths = (4, 10, 6, 5, 10, max(11, len(heads[5])), max(len(row[-1]) for row in rows))
+    table = [" ".join(f"{cell:>{width}}" for cell, width in zip(row, widths, strict=False)) for row in rows]
     left = len(history.steps) - _LINES
     more = [f"   ... {counted(left, 'more step')}"] if left > 0 else []
     return "\n".join([_heading(history), *table, *more, "tree", *tree_lines(history), *_notes(history)])
@@ -413,14 +428,24 @@ def history_text(history: HistoryData, units: tuple[str, str] | None = None) -> 
 def history_html(history: HistoryData) -> str:
     """HTML that a notebook shows."""
     tree = html_lines(["tree", *tree_lines(history)])
-    return html_lines([_heading(history)]) + html_table(_HEADS, _rows(history)) + tree + html_lines(_notes(history))
+    return html_lines([_heading(history)]) + html_table(*steps_table(history)) + tree + html_lines(_notes(history))
 
 
 def steps_table(
     history: HistoryData, units: tuple[str, str] | None = None
 ) -> tuple[tuple[str, ...], list[tuple[str, ...]]]:
     """Heads and rows of the table of the steps."""
-    return (*_HEADS[:-1], in_units(_HEADS[-1], "work", units)), _rows(history)
+    heads = (*_HEADS[:-1], in_units(_HEADS[-1], "work", units))
+    if (verdicts := history.verdicts) is None:
+        return heads, _rows(history)
+    away = [_away([verdicts[node].verdict for node in history.nodes_of(k + 1)]) for k in range(len(history.steps))]
+    return (*heads, "run away"), [(*row, words) for row, words in zip(_rows(history), away, strict=False)]
+
+
+def _away(verdicts: Sequence[Verdict]) -> str:
+    """How many roots of a step run away, and of how many that is undecided."""
+    open_ones = verdicts.count("undecided")
+    return f"{verdicts.count('runs away')}" + (f", {open_ones} undecided" if open_ones else "")
 
 
 def tree_lines(history: HistoryData, most: int = _LINES) -> Iterator[str]:
@@ -428,7 +453,7 @@ def tree_lines(history: HistoryData, most: int = _LINES) -> Iterator[str]:
 
     What follows a node that several lead to stands below the first of them.
     """
-    graph, last, seen = history.graph, len(history.steps), set()
+    graph, last, seen, verdicts = history.graph, len(history.steps), set(), history.verdicts or {}
     pending = [(node, "", "") for node in reversed(list(graph.successors((0, 0))))]
     if len(pending) > 1:
         pending = [(node, *_BRANCH[k == 0]) for k, (node, _, _) in enumerate(pending)]
@@ -440,7 +465,8 @@ def tree_lines(history: HistoryData, most: int = _LINES) -> Iterator[str]:
             continue
         left = "" if node[0] == last or node in history.followed else " (not followed)"
         again = " (see above)" if node in seen else ""
-        yield f"{first}{node[0]}.{node[1]} {summary(graph.nodes[node]['statuses'])}{left}{again}"
+        told = _TOLD[verdicts[node].verdict] if node in verdicts else ""
+        yield f"{first}{node[0]}.{node[1]} {summary(graph.nodes[node]['statuses'])}{told}{left}{again}"
         if node in seen:
             continue
         seen.add(node)

@@ -13,7 +13,7 @@ from enumsol.branches.claims import Standing
 from enumsol.errors import IncompleteGraphError
 
 INTERVAL = (0.0, 10.0)
-GRAPH = ("graph", "gallery:two-node-6.4", "--from", 0, "--to", 10)
+GRAPH = ("graph", "gallery:two-node-6.4", "--no-stability", "--from", 0, "--to", 10)
 #: Nodes after which the search over two-node-6.4 has found nothing, one arc, and two arcs.
 CUTS = {1: 0, 7: 1, 11: 2}
 #: How many solutions these arcs prove at alpha = 5, where there are three: all indices add up to +1, so that there is

@@ -133,3 +133,26 @@ def test_printed_graphs_and_tables_show_verdicts(square, untold):
     assert "stability: whether the body can leave it along a straight line" in text
     assert ">stability</th>" in square._repr_html_()
     assert square.to_frame().stability.tolist() == [QUIET, AWAY, QUIET, AWAY, AWAY]
+
+
+def test_tables_can_leave_out_what_runs_away():
+    problem = enumsol.gallery.one_node_triangle()
+    table = enumsol.multiplicity_table(problem, [1, 5])
+    assert "left_out" not in table
+    table = enumsol.multiplicity_table(problem, [1, 5], without="running away")
+    assert table["roots"].tolist() == [1, 2]
+    assert table["left_out"].tolist() == [0, 1]
+    assert table["stability_undecided"].tolist() == [0, 0]
+    assert table["with_slip_minus"].tolist() == [0, 0]
+    assert table["index_sum"].tolist() == [1, 1]
+    fast = enumsol.multiplicity_table(problem, [5], without="running away", arithmetic="fast")
+    assert fast[["roots", "left_out", "stability_undecided"]].to_numpy().tolist() == [[3, 0, 3]]
+
+
+def test_tables_refuse_what_they_cannot_leave_out():
+    problem = enumsol.gallery.one_node_triangle()
+    with pytest.raises(enumsol.InvalidArgumentError, match="without is 'sliding'"):
+        enumsol.multiplicity_table(problem, [1], without="sliding")
+    bare = enumsol.ContactProblem(np.eye(2), [[1, 0]], [[0, 1]], [1, 2], friction=0.5)
+    with pytest.raises(enumsol.InvalidArgumentError, match="no mass and no mesh"):
+        enumsol.multiplicity_table(bare, [1], without="running away")

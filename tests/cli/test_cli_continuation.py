@@ -26,7 +26,18 @@ def points(capsys, tmp_path):
 
 @pytest.fixture
 def graph(capsys, tmp_path):
-    printed(capsys, "graph", "gallery:one-node-6.1", "--from", 0, "--to", 20, "--save", tmp_path / "graph.json")
+    printed(
+        capsys,
+        "graph",
+        "gallery:one-node-6.1",
+        "--no-stability",
+        "--from",
+        0,
+        "--to",
+        20,
+        "--save",
+        tmp_path / "graph.json",
+    )
     return tmp_path / "graph.json"
 
 

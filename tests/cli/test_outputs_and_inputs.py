@@ -40,7 +40,7 @@ def place(tmp_path, monkeypatch):
     return tmp_path
 
 
-ROOTS, GRAPH = ("roots", "p.npz", "--alpha", 5), ("graph", "p.npz", "--from", 0, "--to", 5)
+ROOTS, GRAPH = ("roots", "p.npz", "--alpha", 5), ("graph", "p.npz", "--no-stability", "--from", 0, "--to", 5)
 INPUTS = [
     *((*ROOTS, option, "p.npz") for option in ("--json", "--csv", "--report", "--proof")),
     *((*ROOTS, "--json", name) for name in ("./p.npz", "mm/../p.npz", "link", "twin")),
@@ -48,7 +48,7 @@ INPUTS = [
     ("roots", "mm", "--alpha", 5, "--csv", "mm/A.mtx"),
     ("roots", "mm", "--alpha", 5, "--csv", "mm/node_ids.json"),
     *((*GRAPH, option, "p.npz") for option in ("--json", "--csv", "--save", "--graphml", "--proof")),
-    ("report", "p.npz", "--from", 0, "--to", 5, "-o", "p.npz"),
+    ("report", "p.npz", "--no-stability", "--from", 0, "--to", 5, "-o", "p.npz"),
     ("table", "p.npz", "--alphas", "1,2", "--csv", "p.npz"),
     ("history", "p.npz", "--steps", "steps.csv", "--csv", "steps.csv"),
     ("history", "body.toml", "--json", "steps.csv"),
@@ -131,7 +131,7 @@ def test_a_result_replaces_the_one_before(place, capsys):
         (GRAPH, "--proof", "a proof"),
         (GRAPH, "--save", "a saved graph or history"),
         (GRAPH, "--graphml", "a GraphML file"),
-        (("report", "p.npz", "--from", 0, "--to", 5), "--output", "an HTML page"),
+        (("report", "p.npz", "--no-stability", "--from", 0, "--to", 5), "--output", "an HTML page"),
         (("history", "p.npz", "--steps", "1"), "--save", "a saved graph or history"),
     ],
 )

@@ -24,7 +24,7 @@ from enumsol.support.plotting import new_figure
 
 pytest.importorskip("plotly")
 HOSTILE = '</script><script>alert("2")</script>'
-REPORT = ("report", "gallery:two-node-6.4", "--from", 0, "--to", 10)
+REPORT = ("report", "gallery:two-node-6.4", "--no-stability", "--from", 0, "--to", 10)
 
 
 def matrices(problem):

@@ -1,0 +1,56 @@
+"""``enumsol graph`` says which arcs run away: if asked, if it is cheap, or not at all."""
+
+import csv
+import io
+import json
+
+import numpy as np
+import pytest
+from command_line import assert_refused, printed, run
+
+import enumsol
+from enumsol.cli import graph as command
+
+GRAPH = ("graph", "gallery:one-node-6.1", "--from", 0, "--to", 3)
+QUIET, AWAY = "does not run away", "runs away"
+
+
+def test_it_is_said_if_it_is_asked_for(capsys, tmp_path):
+    text = printed(capsys, *GRAPH, "--stability")
+    assert f"stability: {QUIET} (1 arc); {AWAY} (1 arc)" in text
+    rows = list(csv.DictReader(io.StringIO(printed(capsys, *GRAPH, "--stability", "--csv", "-"))))
+    assert [row["stability"] for row in rows] == [QUIET, QUIET, AWAY]
+    content = json.loads(printed(capsys, *GRAPH, "--stability", "--json", "-"))
+    assert [spans[0]["verdict"] for spans in content["stability"]] == [QUIET, QUIET, AWAY]
+    assert [arc["stability"] for arc in content["arc_list"]] == [QUIET, QUIET, AWAY]
+
+
+def test_it_is_left_out_if_that_is_asked_for(capsys):
+    assert "stability" not in printed(capsys, *GRAPH, "--no-stability")
+
+
+@pytest.mark.parametrize(("share", "shown"), [(1e9, True), (0.0, False)])
+def test_without_being_asked_only_where_it_is_cheap(capsys, monkeypatch, share, shown):
+    monkeypatch.setattr(command, "_SHARE", share)
+    note = None if shown else "more than a tenth of the time of the graph; --stability finds it"
+    assert ("stability" in printed(capsys, *GRAPH, note=note)) is shown
+    if not shown:
+        assert run(capsys, *GRAPH, "--quiet")[2] == ""
+
+
+def test_without_a_mass_nothing_is_said_or_it_is_refused(capsys, tmp_path):
+    problem = enumsol.ContactProblem(np.eye(2), [[1, 0]], [[0, 1]], [1, 2], friction=0.5)
+    enumsol.write_problem(problem, tmp_path / "bare.npz")
+    bare = ("graph", tmp_path / "bare.npz", "--from", 0, "--to", 1)
+    assert "stability" not in printed(capsys, *bare)
+    assert_refused(*run(capsys, *bare, "--stability"), "no mass and no mesh")
+    space = ("graph", "gallery:one-node-3d-3", "--from", 0, "--to", 1, "--stability")
+    assert_refused(*run(capsys, *space), "one in 3D")
+
+
+def test_ctrl_c_keeps_the_graph(capsys, monkeypatch):
+    def interrupted(self):
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(enumsol.BranchGraph, "stability", interrupted)
+    assert "complete: yes (proven)" in printed(capsys, *GRAPH, "--stability", status=130)
