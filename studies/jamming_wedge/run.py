@@ -67,6 +67,7 @@ def row(size: tuple[int, int], graph: enumsol.BranchGraph, p: int) -> dict[str, 
 def picture(graph: enumsol.BranchGraph, alpha: float, title: str) -> Any:
     """The branches, and the bodies of all solutions at one alpha: below, slender ones beside."""
     roots = graph.roots_at(alpha)
+    verdicts = roots.stability()
     columns = 5
     if len(roots) > 3:
         figure = new_figure(figsize=(10.0, 6.4))
@@ -83,7 +84,7 @@ def picture(graph: enumsol.BranchGraph, alpha: float, title: str) -> Any:
         texts = [text.get_text() for text in legend.get_texts()]
         entries.update(zip(texts, legend.legend_handles, strict=True))
         legend.remove()
-        ax.set_title(f"solution {k}, index {root.index:+d}", fontsize=9)
+        ax.set_title(f"solution {k}\n{verdicts[k].verdict}", fontsize=9)
         ax.set_axis_off()
     below.legend(entries.values(), entries, loc="outside lower center", ncols=columns, fontsize=8, frameon=False)
     return figure
