@@ -10,6 +10,7 @@ import numpy as np
 from enumsol.errors import InvalidArgumentError
 from enumsol.model.problem import ContactProblem
 from enumsol.roots.stability import Stabilities
+from enumsol.search.growing_motions import GrowingMotions
 from enumsol.search.stability import Proven, StabilitySearch
 from enumsol.support.deadlines import look
 from enumsol.trusted.motions_of_body import friction_over
@@ -143,10 +144,10 @@ def _extended(proven: Proven, setting: Setting) -> bool | tuple[float, float]:
     """What is proven at one alpha, if it holds for a range of them."""
     stiffness, motions = setting.stiffness, setting.motions
     for tried, _ in proven.growing:
-        crossing = StabilitySearch(stiffness, motions).crossing_near(tried)
+        crossing = GrowingMotions(stiffness, motions).crossing_near(tried)
         if crossing is not None:
             return float(np.sqrt(crossing.low) * (1 - 2.0**-50)), float(np.sqrt(crossing.high) * (1 + 2.0**-50))
-        at = StabilitySearch(stiffness, motions).zero_near(tried)
+        at = GrowingMotions(stiffness, motions).zero_near(tried)
         if at is None:
             continue
         for step in _GRIDS:

@@ -10,6 +10,7 @@ from linear_motions import random_motion, setting
 
 import enumsol
 from enumsol.branches.stability import ArcStabilities
+from enumsol.search.growing_motions import GrowingMotions
 from enumsol.search.stability import StabilitySearch
 from enumsol.trusted.running_away import Crossing
 
@@ -30,10 +31,9 @@ def proven_crossings(seeds):
     for seed in seeds:
         data = random_motion(np.random.default_rng(seed))
         stiffness, motions = setting(*data)
-        search = StabilitySearch(stiffness, motions)
-        growing = search.run().growing
+        growing = StabilitySearch(stiffness, motions).run().growing
         for known, _ in growing:
-            found = search.crossing_near(known)
+            found = GrowingMotions(stiffness, motions).crossing_near(known)
             if found is not None:
                 yield stiffness, motions, found, [mu for mu, *_ in growing_motions(*data)]
 
