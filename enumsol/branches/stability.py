@@ -42,6 +42,14 @@ class Span:
         the alpha at which the verdict changes.
     growth : (float, float) or None
         Bounds of the growth rate of a motion in the range [1 / time].
+
+    Examples
+    --------
+    >>> import enumsol
+    >>> graph = enumsol.branch_graph(enumsol.gallery.one_node_triangle(), (0, 3))
+    >>> [span] = graph.stability()[2]
+    >>> round(span.low, 4), span.high, span.verdict
+    (2.6667, 3.0, 'runs away')
     """
 
     low: float

@@ -333,6 +333,9 @@ class MultiplicityMap(Immutable):
         width = max([9, *(len(_counts(row)) for row in self.rows)])
         lines.append(f"{self.name:>8}  {'solutions':<{width}}  {'unique until':>12}")
         lines += [f"{row.value:>8.5g}  {_counts(row):<{width}}  {_limit(row):>12}" for row in self.rows]
+        if any(row.left_out for row in self.rows):
+            open_ones = " and undecided ones counted" if any(any(row.undecided) for row in self.rows) else ""
+            lines.append(f"solutions that run away are left out{open_ones}")
         return "\n".join([*lines, self.closing_line])
 
 

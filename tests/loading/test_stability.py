@@ -78,6 +78,7 @@ def test_maps_can_leave_out_what_runs_away(triangle):
     assert (row.between, row.left_out, row.undecided) == ((1, 2), (0, 1), (0, 0))
     assert row.alphas == whole.alphas
     assert found.multiplicity_at(0.0, 2.9) == 2
+    assert "\nsolutions that run away are left out\n" in repr(found)
     assert found.to_frame()[["solutions", "left_out", "stability_undecided"]].to_numpy().tolist() == [
         [1, 0, 0],
         [2, 1, 0],
