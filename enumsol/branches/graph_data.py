@@ -188,12 +188,12 @@ class GraphData(Immutable):
 
     @cached_property
     def _found(self) -> dict[str, list[tuple[Span, ...]]]:
-        """What is found about the arcs later, arc by arc; it may be cut short."""
+        """Findings about the arcs, arc by arc; they may be cut short."""
         return {}
 
     @property
     def verdicts(self) -> tuple[tuple[Span, ...], ...] | None:
-        """What `BranchGraph.stability` found last, or None where it was not asked, or cut short."""
+        """Verdicts that `BranchGraph.stability` found last, or None where it was not asked, or cut short."""
         found = self._found.get("verdicts")
         return None if found is None or len(found) < len(self.arcs) else tuple(found)
 

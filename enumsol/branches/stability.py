@@ -45,6 +45,14 @@ class Span:
         the alpha at which the verdict changes.
     growth : (float, float) or None
         Bounds of the growth rate of a motion in the range [1 / time].
+
+    Examples
+    --------
+    >>> import enumsol
+    >>> graph = enumsol.branch_graph(enumsol.gallery.one_node_triangle(), (0, 3))
+    >>> [span] = graph.stability()[2]
+    >>> round(span.low, 4), span.high, span.verdict
+    (2.6667, 3.0, 'runs away')
     """
 
     low: float
@@ -141,7 +149,7 @@ class ArcStabilities:
 
 
 def _extended(proven: Proven, setting: Setting) -> bool | tuple[float, float]:
-    """What is proven at one alpha, if it holds for a range of them."""
+    """A proof at one alpha, if it holds for a range of them."""
     stiffness, motions = setting.stiffness, setting.motions
     for tried, _ in proven.growing:
         crossing = GrowingMotions(stiffness, motions).crossing_near(tried)

@@ -56,7 +56,7 @@ _MOST_WAYS = 20_000
 
 @dataclass
 class _Said:
-    """What the proof says of a root."""
+    """Words of the proof on a root."""
 
     number: int
     point: Floats
@@ -143,7 +143,7 @@ class StabilityChecker(ProofChecker):
         return roots  # type: ignore[no-any-return]
 
     def _said(self, records: Iterator[Any]) -> tuple[list[_Said], Any]:
-        """What is said of each root, and the record after it."""
+        """Claims on each root, and the record after them."""
         said: list[_Said] = []
         for record in records:
             if isinstance(record, dict):
@@ -184,7 +184,7 @@ class StabilityChecker(ProofChecker):
     # -- roots -----------------------------------------------------------------------------------------------------
 
     def _verdict(self, said: _Said, leaves: list[Located]) -> tuple[str, tuple[float, float] | None]:
-        """What is proven of a root, and bounds of the rate of a motion that grows."""
+        """The proven verdict on a root, and bounds of the rate of a motion that grows."""
         F = friction_over(self.problem, self.checker.alpha, self.checker.alpha)
         known = next((found for leaf in leaves if (found := self._statuses(leaf, F)) is not None), None)
         if said.verdict == UNDECIDED or known is None:
@@ -225,7 +225,7 @@ class StabilityChecker(ProofChecker):
         return RUNS_AWAY, (math.sqrt(low) * _BELOW, math.sqrt(high) * _ABOVE)
 
     def _statuses(self, leaf: Located, F: list[Ball]) -> tuple[list[int], Floats | None] | None:
-        """What every node does, strictly, and in 3D bounds of lambda_t; None where it is not certain."""
+        """Statuses that hold strictly, and in 3D bounds of lambda_t; None where they are not certain."""
         p, forces = self.problem.p, leaf.forces
         sides = [forces[(k + 1) * p : (k + 2) * p] for k in range(self.body.tangents)]
         codes = []
@@ -253,7 +253,7 @@ class StabilityChecker(ProofChecker):
 
 
 def _within(pressure: float, axes: list[tuple[Ball, Ball]]) -> bool:
-    """Whether a force is surely less than friction, lambda_n at least ``pressure`` and F > 0 along these axes."""
+    """True if a force is surely less than friction, lambda_n at least ``pressure`` and F > 0 along these axes."""
     shares = []
     for F, force in axes:
         least = (float(F.mid) - float(F.rad)) * _BELOW

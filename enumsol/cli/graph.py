@@ -223,7 +223,7 @@ def _told(
 
 
 def _has_mass(problem: AnyProblem) -> bool:
-    """Whether verdicts on arcs can be found without more data."""
+    """True if verdicts on arcs can be found without more data."""
     from enumsol.model.problem import ContactProblem  # numpy: not for --help
 
     return isinstance(problem, ContactProblem) and (problem.mass is not None or problem.mesh is not None)

@@ -428,7 +428,7 @@ class History(Immutable):
 
     @property
     def verdicts(self) -> Mapping[history_data.Node, Stability] | None:
-        """What `stability` found last, or None."""
+        """Verdicts that `stability` found last, or None."""
         return self.data.verdicts
 
     # -- results ---------------------------------------------------------------------------------------------------

@@ -443,7 +443,7 @@ def steps_table(
 
 
 def _away(verdicts: Sequence[Verdict]) -> str:
-    """How many roots of a step run away, and of how many that is undecided."""
+    """Numbers of roots of a step that run away, and that are undecided."""
     open_ones = verdicts.count("undecided")
     return f"{verdicts.count('runs away')}" + (f", {open_ones} undecided" if open_ones else "")
 

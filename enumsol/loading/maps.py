@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import time
+from collections import Counter
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import closing
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
+from fractions import Fraction
 from functools import cached_property, partial
 from itertools import pairwise
 from textwrap import fill
@@ -14,6 +16,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from enumsol.branches.construction import branch_graph
+from enumsol.branches.samples import RUNNING_AWAY, check_without
 from enumsol.errors import InvalidArgumentError
 from enumsol.model.problem import ContactProblem
 from enumsol.search.outcome import Stop, StopReason
@@ -27,11 +30,11 @@ from enumsol.support.workers import spread, workers_of
 
 if TYPE_CHECKING:
     from concurrent.futures import Executor
-    from fractions import Fraction
     from pathlib import Path
 
     import pandas as pd
 
+    from enumsol.branches.graph import BranchGraph
     from enumsol.support.array_types import Alpha, AlphaLike
     from enumsol.support.workers import Call
 
@@ -47,6 +50,7 @@ def multiplicity_map(
     alphas: tuple[AlphaLike, AlphaLike],
     over: object,
     *,
+    without: str | None = None,
     executor: Executor | None = None,
     jobs: int | None = None,
     progress: Callable[[int, int], object] | None = None,
@@ -68,6 +72,9 @@ def multiplicity_map(
         ``{"gap": values}`` (at all nodes) [length], ``{"load": (direction, values)}`` with a direction of shape (n,)
         that is added to f, times the value; or ``(make, values)`` with a function of a value that returns a problem,
         for example with another mesh.
+    without : "running away", optional
+        Leave out solutions that are proven to run away (see `stability`; the problems need a mass or a mesh). Undecided
+        ones are counted, and so are those at vertices of the graphs, as at the ends of the interval.
     executor : concurrent.futures.Executor, optional
         Makes several graphs at a time. A function ``make`` must be one that other processes can import.
     jobs : int, optional
@@ -106,6 +113,11 @@ def multiplicity_map(
     name, make, values = _parameter(problem, over)
     arguments.optional_executor(executor, jobs)
     arguments.optional_callable(progress, "progress")
+    if without is not None:
+        arguments.one_of(without, "without", (RUNNING_AWAY,))
+        if problem is not None:
+            check_without(without, problem)
+        options["without"] = without
     if "interval" in options or "progress" in options:
         raise InvalidArgumentError("interval and progress are not options here; expected those of branch_graph")
     rows = _Rows(name, interval, values, make, options, arguments.optional_seconds(time_limit))
@@ -246,9 +258,11 @@ class MultiplicityMap(Immutable):
         """Table with a row per value and range of alpha with one number of solutions.
 
         Columns: value; first and last of the range; solutions, exact (or a lower bound); complete (the value's graph).
+        Where those that run away are left out, also left_out, how many they are, and stability_undecided.
         """
         import pandas as pd
 
+        told = ["left_out", "stability_undecided"] if any(row.left_out for row in self.rows) else []
         return pd.DataFrame(
             [
                 {
@@ -256,13 +270,14 @@ class MultiplicityMap(Immutable):
                     "first": float(row.alphas[k]),
                     "last": float(row.alphas[k + 1]),
                     "solutions": count,
+                    **({"left_out": row.left_out[k], "stability_undecided": row.undecided[k]} if row.left_out else {}),
                     "exact": row.exact,
                     "complete": row.complete,
                 }
                 for row in self.rows
                 for k, count in enumerate(row.between)
             ],
-            columns=["value", "first", "last", "solutions", "exact", "complete"],
+            columns=["value", "first", "last", "solutions", *told, "exact", "complete"],
         )
 
     def plot(self, *, units: tuple[str, str] | None = None, ax: object = None, file: str | Path | None = None) -> Any:
@@ -318,6 +333,9 @@ class MultiplicityMap(Immutable):
         width = max([9, *(len(_counts(row)) for row in self.rows)])
         lines.append(f"{self.name:>8}  {'solutions':<{width}}  {'unique until':>12}")
         lines += [f"{row.value:>8.5g}  {_counts(row):<{width}}  {_limit(row):>12}" for row in self.rows]
+        if any(row.left_out for row in self.rows):
+            open_ones = " and undecided ones counted" if any(any(row.undecided) for row in self.rows) else ""
+            lines.append(f"solutions that run away are left out{open_ones}")
         return "\n".join([*lines, self.closing_line])
 
 
@@ -424,6 +442,9 @@ class MapRow:
     within : float or None
         Of a body that nothing holds: the numbers are those of solutions whose rigid displacement is within this bound
         [length].
+    left_out, undecided : tuples of int
+        Where solutions that run away are left out of the numbers: how many they are between the alphas, and how many
+        of those that are counted are undecided. ``limit`` and ``unique`` are about all solutions.
     """
 
     value: float
@@ -438,6 +459,8 @@ class MapRow:
     unique: bool | None
     seconds: float
     within: float | None = None
+    left_out: tuple[int, ...] = ()
+    undecided: tuple[int, ...] = ()
 
     def count_at(self, alpha: Alpha) -> int:
         """Number of solutions at an alpha of the interval; a lower bound where the row is not exact."""
@@ -455,14 +478,15 @@ def map_row(
     """Row of a map (a module-level function, so that other processes can import it)."""
     started = time.perf_counter()
     problem = arguments.instance_of(make(value), ContactProblem, "the problem that over makes")
-    graph = branch_graph(problem, interval, **options)
+    own = {name: option for name, option in options.items() if name != "without"}
+    graph = branch_graph(problem, interval, **own)
     steps, uniqueness = graph.claims.steps(), graph.claims.uniqueness()
     arcs = {vertex.number: [] for vertex in graph.folds}  # type: dict[int, list[tuple[str, ...]]]
     for arc in graph.arcs:
         for end in {arc.tail, arc.head} & arcs.keys():
             arcs[end].append(tuple(status.value for status in arc.statuses))
     folds = tuple(MapFold(fold.alpha, tuple(sorted(arcs[fold.number]))) for fold in graph.folds)
-    return MapRow(
+    row = MapRow(
         value=value,
         alphas=steps.alphas,
         at_alphas=steps.at,
@@ -475,6 +499,37 @@ def map_row(
         unique=uniqueness.throughout,
         seconds=time.perf_counter() - started,
         within=None if problem.held else problem.rigid_reach,
+    )
+    return row if "without" not in options else _resting(row, graph, started)
+
+
+def _resting(row: MapRow, graph: BranchGraph, started: float) -> MapRow:
+    """A row without the solutions that run away; its alphas are also those where a verdict changes."""
+    spans = graph.stability()
+    changes = {Fraction(span.high) for several in spans for span in several[:-1]}
+    alphas = tuple(sorted({*row.alphas, *changes}))
+    middles = [(low + high) / 2 for low, high in pairwise(alphas)]
+    over = [{arc.number for arc in graph.located(middle)[0]} for middle in middles]
+
+    def verdicts(arcs: set[int], alpha: Fraction) -> Counter[str]:
+        return Counter(
+            next((span.verdict for span in spans[k] if alpha <= span.high), spans[k][-1].verdict) for k in arcs
+        )
+
+    between = [verdicts(arcs, middle) for arcs, middle in zip(over, middles, strict=True)]
+    # at a critical alpha, the arcs that go on beyond it
+    passing = [a & b for a, b in zip([over[0], *over], [*over, over[-1]], strict=True)]
+    at = [verdicts(arcs, alpha) for arcs, alpha in zip(passing, alphas, strict=True)]
+    at[0] = at[-1] = Counter()  # at the ends of the interval there are vertices
+    away = "runs away"
+    return replace(
+        row,
+        alphas=alphas,
+        at_alphas=tuple(row.count_at(x) - found[away] for x, found in zip(alphas, at, strict=True)),
+        between=tuple(row.count_at(x) - found[away] for x, found in zip(middles, between, strict=True)),
+        left_out=tuple(found[away] for found in between),
+        undecided=tuple(found["undecided"] for found in between),
+        seconds=time.perf_counter() - started,
     )
 
 

@@ -64,7 +64,7 @@ def checked_mass(mass: ArrayLike | sp.sparray | sp.spmatrix, A: sp.csc_array, mo
 
 
 def _semidefinite(M: sp.csc_array, diagonal: Floats) -> bool:
-    """Whether a matrix has no eigenvalue below zero, up to rounding and relative to its diagonal."""
+    """True if a matrix has no eigenvalue below zero, up to rounding and relative to its diagonal."""
     from enumsol.condensation.factorization import Factorization  # scipy's solvers come with the first use
 
     own = np.flatnonzero(diagonal > 0)

@@ -32,7 +32,7 @@ def root_from(record: Any, size: int) -> tuple[Floats, str]:
 
 
 def is_certificate(record: Any) -> bool:
-    """Whether a record belongs to the root before it."""
+    """True if a record belongs to the root before it."""
     return isinstance(record, list) and bool(record) and record[0] in (GROWS, NOTHING)
 
 

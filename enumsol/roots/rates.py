@@ -1,4 +1,4 @@
-"""How an equilibrium goes on when the load changes: the problem of rates (theory, section 15.5)."""
+"""Ways in which an equilibrium goes on when the load changes: the problem of rates (theory, section 15.5)."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ _LARGEST = 14
 
 @dataclass(frozen=True)
 class Way(Sealed):
-    """One way in which an equilibrium goes on.
+    """A way in which an equilibrium goes on.
 
     Attributes
     ----------
@@ -40,6 +40,15 @@ class Way(Sealed):
         Rate of the displacement [length / time].
     lambda_n, lambda_t : (p,) arrays; in 3D lambda_t is (p, 2)
         Rates of the contact forces [force / time].
+
+    Examples
+    --------
+    >>> import enumsol
+    >>> problem = enumsol.gallery.get("taper-8").build()
+    >>> stuck = enumsol.enumerate_roots(problem, alpha=0.2)[2]
+    >>> (way,) = enumsol.rates(problem, stuck, load_rate=problem.f).ways
+    >>> way.u.shape, way.lambda_n.shape
+    ((50,), (8,))
     """
 
     slides: tuple[int, ...]

@@ -329,7 +329,7 @@ class RootSet(Sequence[Root], Immutable):
 
     @property
     def verdicts(self) -> tuple[Stability, ...] | None:
-        """What `stability` found last, or None."""
+        """Verdicts that `stability` found last, or None."""
         return self._found.get("verdicts")
 
     @property

@@ -32,7 +32,7 @@ _CODES = {status: code for code, status in enumerate(STATUSES)} | {ContactStatus
 
 @dataclass(frozen=True)
 class Stability(Sealed):
-    """Whether an equilibrium runs away (theory, section 15).
+    """True if an equilibrium runs away (theory, section 15).
 
     It runs away if the body, left there, can leave along a straight line with a displacement that grows like exp(rho
     t): it cannot rest in it. If it does not run away, nothing more is said: a motion that slips to and fro may grow all
@@ -69,7 +69,7 @@ class Stability(Sealed):
 def stability(
     problem: AnyProblem, root: Root, *, mass: ArrayLike | sp.sparray | sp.spmatrix | None = None
 ) -> Stability:
-    """Whether an equilibrium runs away: whether the body can leave it along a straight line, growing exponentially.
+    """True if an equilibrium runs away: whether the body can leave it along a straight line, growing exponentially.
 
     The verdicts "runs away" and "does not run away" are proven, for the statuses of the root, in the linearized motion
     with Coulomb's law in terms of velocities and without damping (theory, section 15; in 3D to first order). One that
@@ -204,7 +204,7 @@ class Stabilities:
             yield setting, self._proven(setting)
 
     def _proven(self, setting: Setting) -> Proven:
-        """What is proven of one part: the same for all roots with these nodes, friction and directions."""
+        """Proofs about one part: the same for all roots with these nodes, friction and directions."""
         F, moves = setting.motions.slopes, setting.motions.moves
         leaning = tuple((float(node.F.mid), float(node.F.rad)) for node in setting.motions.touching)
         arrays = (part.tobytes() for part in (F.mid, F.rad, moves.mid, moves.rad))

@@ -62,7 +62,7 @@ def write_proof(proof: Proof, roots: Iterable[Root], asked: Stabilities, path: s
 
 
 def _certified(asked: Stabilities, root: Root, found: Stability) -> tuple[str, list[Any]]:
-    """What can be proven from the proof of the roots alone, and the records of its certificates."""
+    """Verdict that follows from the proof of the roots alone, and the records of its certificates."""
     if found.verdict == UNDECIDED or not _strict(root):
         return UNDECIDED, []
     parts = list(asked.examined(root))
@@ -78,7 +78,7 @@ def _certified(asked: Stabilities, root: Root, found: Stability) -> tuple[str, l
 
 
 def _strict(root: Root) -> bool:
-    """Whether every node with a choice has one status, and surely touches or not."""
+    """True if every node with a choice has one status, and surely touches or not."""
     return all(len(held) == 1 or ContactStatus.OPEN not in held for held in root.active) and (
         root.regular or all(len(held) == 1 for held in root.active)
     )

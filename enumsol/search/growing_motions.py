@@ -113,7 +113,7 @@ class GrowingMotions:
         return None
 
     def _definite_at(self, mu: float) -> bool:
-        """Whether plain numbers serve at one mu, in floats."""
+        """True if plain numbers serve at one mu, in floats."""
         K = self.stiffness.at(mu)
         return K is not None and serves(self.motions, K.mid)
 
@@ -186,7 +186,7 @@ class GrowingMotions:
 
 
 def serves(motions: Motions, K: Floats) -> bool:
-    """Whether plain numbers make the form definite at one K, in floats."""
+    """True if plain numbers make the form definite at one K, in floats."""
     Q = motions.leaning.mid.T @ K @ motions.moves.mid
     unit = 1.0 / np.sqrt(np.maximum(np.abs(Q.diagonal()), np.finfo(float).tiny))
     Q = Q * unit[:, None] * unit
@@ -279,7 +279,7 @@ def _determinant(matrices: Floats) -> Floats:
 
 
 def _forward(matrices: Floats, signed: Mask) -> Floats:
-    """Of each matrix the real eigenvalue whose eigenvector is most nearly of one sign where it is signed; or nan."""
+    """Real eigenvalue of each matrix whose eigenvector is most nearly of one sign where it is signed; or nan."""
     if not np.all(np.isfinite(matrices)):
         return np.full(len(matrices), np.nan)
     values, vectors = np.linalg.eig(matrices)

@@ -45,7 +45,7 @@ _FREE_WEIGHTS, _PROGRAMS = 24, 300
 
 @dataclass(frozen=True, eq=False)
 class Proven:
-    """What is proven of the motions that may grow at an equilibrium.
+    """Proofs about the motions that may grow at an equilibrium.
 
     Attributes
     ----------
@@ -78,7 +78,7 @@ class StabilitySearch:
     _programs: int = 0
 
     def run(self) -> Proven:
-        """What is proven."""
+        """Search, and all that is proven."""
         if not self.stiffness.increases:
             # neither a motion nor a range without end can be proven
             return Proven((), (), ((0.0, np.inf),))
@@ -110,7 +110,7 @@ class StabilitySearch:
         yield low, np.inf
 
     def _serve_to(self, low: float, high: float) -> bool:
-        """Whether plain numbers serve in a long range."""
+        """True if plain numbers serve in a long range."""
         K = self.stiffness.at(high)
         return K is not None and serves(self.motions, K.mid) and self._try(low, high)
 
@@ -141,7 +141,7 @@ class StabilitySearch:
         yield from self._halved(middle, high)
 
     def _try(self, low: float, high: float, weights: Floats | None = None, products: Floats | None = None) -> bool:
-        """Whether some numbers serve in a range, which is then noted."""
+        """True if some numbers serve in a range, which is then noted."""
         tried = self._certificate(low, high, weights, products)
         if tried is None:
             return False
@@ -176,7 +176,7 @@ class StabilitySearch:
         return one * products, other * products
 
     def _beside(self, low: float, high: float) -> tuple[float | None, ...]:
-        """Where slopes of K may be taken from."""
+        """Other mu from which slopes of K may be taken."""
         known = [mu for mu in self.stiffness.known if 0 <= mu < low]
         if np.isinf(high):
             return (None,) if self.stiffness.stiffest is not None else (known[-1],) if known else ()
@@ -190,7 +190,7 @@ class StabilitySearch:
         return smallest_eigenvalue(self.stiffness)
 
     def _middle(self, low: float, high: float, narrow: float) -> float | None:
-        """Where to divide a range of mu; None where it is narrow."""
+        """A place to divide a range of mu; None where it is narrow."""
         if np.isinf(high):
             if low == 0:
                 return self._first

@@ -1,4 +1,4 @@
-"""How the parts of a body may begin to move at an equilibrium, by what its contact nodes do (theory, section 15.2).
+"""Ways in which the parts of a body may begin to move at an equilibrium, by what its contact nodes do (theory, section 15.2).
 
 The search for growing motions and the checker of its proofs build the same motions here, from statuses that hold,
 coefficients of friction and, in 3D, bounds of the tangential forces.
@@ -202,7 +202,7 @@ def friction_over(problem: AnyProblem, low: AlphaLike, high: AlphaLike) -> list[
 
 
 def _kind(held: Collection[int], friction: bool) -> str:
-    """What a node may do: stay open or stuck, slide at its limit, or leave where it touches without force."""
+    """The kind of a node: stay open or stuck, slide at its limit, or leave where it touches without force."""
     codes = set(held)
     if codes == {OPEN}:
         return "open"

@@ -144,7 +144,7 @@ class NoMotion:
         return True
 
     def _admitted(self, motions: Motions) -> bool:
-        """Whether the numbers have the signs that the theorem asks for."""
+        """True if the numbers have the signs that the theorem asks for."""
         k, signed = len(motions.signed), motions.signed
         decided = {*self.slides, *self.stays}
         if len(decided) != len(self.slides) + len(self.stays) or not all(0 <= i < k and signed[i] for i in decided):
@@ -218,7 +218,7 @@ class NoMotion:
 
 
 def rates_in(K: Ball, motions: Motions, held: Ball, slides: Sequence[int]) -> tuple[bool | None, Ball]:
-    """How nodes go on under a rate of load if some at their limit slide and others stay (theory, section 15.5).
+    """Test how nodes go on under a rate of load if some at their limit slide and others stay (theory, section 15.5).
 
     Parameters
     ----------
@@ -334,7 +334,7 @@ class Growing:
         return Ball.beside(*rows), own
 
     def _strict(self, motions: Motions, x: Ball, forces: Ball) -> bool:
-        """Whether every node does what it is said to do, strictly; ``forces`` are K w = -y."""
+        """True if every node does what it is said to do, strictly; ``forces`` are K w = -y."""
 
         def positive_number(value: Ball) -> bool:
             return bool(np.all(value.mid - value.rad > 0))

@@ -67,3 +67,22 @@ def test_it_needs_a_mass(triangle):
         np.eye(2), [[1, 0]], [[0, 1]], [1, 0], friction=0.5, load_slope=[0, 1], mass=np.eye(2)
     )
     assert {found.verdict for found in enumsol.histories(heavy, [0.25, 1]).stability().values()} == {QUIET}
+
+
+def test_maps_can_leave_out_what_runs_away(triangle):
+    over = {"gap": [0.0]}
+    (whole,) = enumsol.multiplicity_map(triangle, (0, 3), over).rows
+    found = enumsol.multiplicity_map(triangle, (0, 3), over, without="running away")
+    (row,) = found.rows
+    assert whole.between == (1, 3)
+    assert (row.between, row.left_out, row.undecided) == ((1, 2), (0, 1), (0, 0))
+    assert row.alphas == whole.alphas
+    assert found.multiplicity_at(0.0, 2.9) == 2
+    assert "\nsolutions that run away are left out\n" in repr(found)
+    assert found.to_frame()[["solutions", "left_out", "stability_undecided"]].to_numpy().tolist() == [
+        [1, 0, 0],
+        [2, 1, 0],
+    ]
+    assert "left_out" not in enumsol.multiplicity_map(triangle, (0, 1), over).to_frame()
+    with pytest.raises(enumsol.InvalidArgumentError, match="without is 'sliding'"):
+        enumsol.multiplicity_map(triangle, (0, 3), over, without="sliding")
