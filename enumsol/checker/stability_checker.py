@@ -50,6 +50,8 @@ _HEADER = {"format", "version", "kind", "problem", "p", "mass"}
 _END = object()
 #: Above rounding in a few operations.
 _ABOVE, _BELOW = 1 + 2.0**-40, 1 - 2.0**-40
+#: Certificates of one root: K(mu) is kept at the ends of all their ranges.
+_MOST_CERTIFICATES = 2_000
 #: Ways in which nodes slide or stay that are looked at for one range.
 _MOST_WAYS = 20_000
 
@@ -163,6 +165,8 @@ class StabilityChecker(ProofChecker):
                 return said, record
             if is_certificate(record) and said:
                 said[-1].certificates.append(record)
+                if len(said[-1].certificates) > _MOST_CERTIFICATES:
+                    raise RefusedError(f"root {said[-1].number} has more than {_MOST_CERTIFICATES} certificates")
                 continue
             try:
                 point, verdict = root_from(record, self.problem.p * (1 + self.body.tangents))

@@ -326,6 +326,12 @@ def test_too_many_or_too_few_roots_and_footers():
     assert "header" in refusal(name, [records[0] | {"more": 1}, *records[1:]])
 
 
+def test_a_file_of_too_many_certificates(monkeypatch):
+    records = known("coupled 3")[3]
+    monkeypatch.setattr(stability_checker, "_MOST_CERTIFICATES", 1)
+    assert "more than 1 certificates" in refusal("coupled 3", records)
+
+
 def test_a_file_that_asks_for_too_many_ways(monkeypatch):
     """All ways of five nodes, one by one; where they are too many, nothing is concluded from them."""
     zero = np.zeros((5, 5))
