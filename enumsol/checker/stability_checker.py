@@ -50,6 +50,8 @@ _HEADER = {"format", "version", "kind", "problem", "p", "mass"}
 _END = object()
 #: Above rounding in a few operations.
 _ABOVE, _BELOW = 1 + 2.0**-40, 1 - 2.0**-40
+#: Certificates of one root: K(mu) is kept at the ends of all their ranges.
+_MOST_CERTIFICATES = 2_000
 #: Ways in which nodes slide or stay that are looked at for one range.
 _MOST_WAYS = 20_000
 
@@ -62,6 +64,14 @@ class _Said:
     point: Floats
     verdict: str
     certificates: list[list[Any]]
+
+
+@dataclass(frozen=True, eq=False)
+class _Root:
+    """A root by its forces, near where it is, and what every node does there, with bounds of lambda_t in 3D."""
+
+    forces: Floats
+    known: tuple[list[int], Floats | None] | None
 
 
 class StabilityChecker(ProofChecker):
@@ -102,8 +112,8 @@ class StabilityChecker(ProofChecker):
             roots = self._roots(records)
             said, footer = self._said(records)
             self._check_end(footer, said, records)
-            for own, leaves in zip(said, self._matched(said, roots), strict=True):
-                verdict, growth = self._verdict(own, leaves)
+            for own, root in zip(said, self._matched(said, roots), strict=True):
+                verdict, growth = self._verdict(own, root)
                 verdicts.append(verdict)
                 bounds.append(growth)
         ok = not self.failures
@@ -126,8 +136,8 @@ class StabilityChecker(ProofChecker):
         if header["mass"] != mass_fingerprint(self.body.mass):
             raise RefusedError("the proof belongs to another mass (its fingerprint is different)")
 
-    def _roots(self, records: Iterator[Any]) -> list[list[Located]]:
-        """Places of the roots, by the proof that they are all."""
+    def _roots(self, records: Iterator[Any]) -> list[_Root]:
+        """The roots, by the proof that they are all."""
         checker = self.checker
         checker.enclosure, checker.located = enclosure_of(self.problem), {}
         self.report = report = checker.run(SearchRecords(search_records(records)))
@@ -137,10 +147,15 @@ class StabilityChecker(ProofChecker):
         if report.data != "problem":
             raise RefusedError("the roots are proven for S and g as computed only, which tells nothing of the body")
         checker.locate_rational_roots()
-        roots = checker.located_roots()
-        if len(roots) != report.roots:
-            raise RefusedError(f"{report.roots} roots are proven, and places of {len(roots)} are known")
-        return roots  # type: ignore[no-any-return]
+        self.F = friction_over(self.problem, checker.alpha, checker.alpha)
+        return [self._root(leaves) for leaves in checker.located_roots()]
+
+    def _root(self, leaves: list[Located]) -> _Root:
+        """A root by any of the leaves that tells what every node does."""
+        for leaf in leaves:
+            if (known := self._statuses(leaf)) is not None:
+                return _Root(leaf.forces.mid, known)
+        return _Root(leaves[0].forces.mid, None)
 
     def _said(self, records: Iterator[Any]) -> tuple[list[_Said], Any]:
         """Claims on each root, and the record after them."""
@@ -150,6 +165,8 @@ class StabilityChecker(ProofChecker):
                 return said, record
             if is_certificate(record) and said:
                 said[-1].certificates.append(record)
+                if len(said[-1].certificates) > _MOST_CERTIFICATES:
+                    raise RefusedError(f"root {said[-1].number} has more than {_MOST_CERTIFICATES} certificates")
                 continue
             try:
                 point, verdict = root_from(record, self.problem.p * (1 + self.body.tangents))
@@ -167,32 +184,43 @@ class StabilityChecker(ProofChecker):
         if next(records, _END) is not _END:
             raise RefusedError("records follow after the end of the proof")
 
-    @staticmethod
-    def _matched(said: list[_Said], roots: list[list[Located]]) -> list[list[Located]]:
-        """Places of the root that every record is about: the nearest one to its forces."""
-        if len(said) != len(roots):
-            raise RefusedError(f"there are {counted(len(roots), 'root')}, and something is said of {len(said)}")
-        nearest = []
+    def _matched(self, said: list[_Said], roots: list[_Root]) -> list[_Root]:
+        """The root that every record is about: the one to whose forces its own are near.
+
+        A degenerate root may be among ``roots`` more than once, and so may ends of families.
+        """
+        count = 0 if self.report is None else self.report.roots
+        if len(said) != count:
+            raise RefusedError(f"there are {counted(count, 'root')}, and something is said of {len(said)}")
+        if not roots:
+            return []
+        forces = np.array([root.forces for root in roots])
+        places = np.unique(forces, axis=0, return_inverse=True)[1].ravel()
+        nearest: list[int] = []
         for own in said:
             with np.errstate(over="ignore"):
-                away = [min(float(np.max(np.abs(leaf.forces.mid - own.point))) for leaf in leaves) for leaves in roots]
-            nearest.append(int(np.argmin(away)))
-        if len({*nearest}) != len(roots):
+                away = np.max(np.abs(forces - own.point), axis=1)
+            best = int(np.argmin(away))
+            others = away[places != places[best]]
+            if not np.all(2 * away[best] < others):
+                raise RefusedError(f"the forces of record {own.number} do not tell which root it is about")
+            nearest.append(best)
+        found = {int(places[k]) for k in nearest}
+        missing = {int(place) for place, root in zip(places, roots, strict=True) if root.known} - found
+        if len(found) < count or missing:
             raise RefusedError("two records are about the same root")
         return [roots[k] for k in nearest]
 
     # -- roots -----------------------------------------------------------------------------------------------------
 
-    def _verdict(self, said: _Said, leaves: list[Located]) -> tuple[str, tuple[float, float] | None]:
+    def _verdict(self, said: _Said, root: _Root) -> tuple[str, tuple[float, float] | None]:
         """The proven verdict on a root, and bounds of the rate of a motion that grows."""
-        F = friction_over(self.problem, self.checker.alpha, self.checker.alpha)
-        known = next((found for leaf in leaves if (found := self._statuses(leaf, F)) is not None), None)
-        if said.verdict == UNDECIDED or known is None:
+        if said.verdict == UNDECIDED or root.known is None:
             if said.verdict == UNDECIDED and said.certificates:
                 self.fail(f"root {said.number} is said to be undecided and has certificates")
             return UNDECIDED, None
-        codes, forces = known
-        parts = list(self.body.settings([{code} for code in codes], F, forces))
+        codes, forces = root.known
+        parts = list(self.body.settings([{code} for code in codes], self.F, forces))
         given: list[list[Growing | NoMotion]] = [[] for _ in parts]
         try:
             for record in said.certificates:
@@ -224,14 +252,14 @@ class StabilityChecker(ProofChecker):
         low, high = found.mu
         return RUNS_AWAY, (math.sqrt(low) * _BELOW, math.sqrt(high) * _ABOVE)
 
-    def _statuses(self, leaf: Located, F: list[Ball]) -> tuple[list[int], Floats | None] | None:
+    def _statuses(self, leaf: Located) -> tuple[list[int], Floats | None] | None:
         """Statuses that hold strictly, and in 3D bounds of lambda_t; None where they are not certain."""
         p, forces = self.problem.p, leaf.forces
         sides = [forces[(k + 1) * p : (k + 2) * p] for k in range(self.body.tangents)]
         codes = []
         for i in range(p):
             pressure = float(forces.mid[i]) - float(forces.rad[i])
-            axes = [(f, side) for f, side in zip(F, sides, strict=True) if f.mid[i] > 0]
+            axes = [(f, side) for f, side in zip(self.F, sides, strict=True) if f.mid[i] > 0]
             if leaf.open is not None and leaf.open[i]:
                 codes.append(OPEN)
             elif not pressure > 0:

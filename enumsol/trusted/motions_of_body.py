@@ -1,4 +1,4 @@
-"""Ways in which the parts of a body may begin to move at an equilibrium, by what its contact nodes do (theory, section 15.2).
+"""Motions that parts of a body may begin at an equilibrium, by what its contact nodes do (theory, section 15.2).
 
 The search for growing motions and the checker of its proofs build the same motions here, from statuses that hold,
 coefficients of friction and, in 3D, bounds of the tangential forces.

@@ -6,7 +6,7 @@ import json
 
 import numpy as np
 import pytest
-from generators import integer_problem
+from generators import integer_problem, singular_problem
 from helpers.command_line import run
 from helpers.floating_space import known_body, plane_over_alpha
 from proof_tools import proof_of, records_of
@@ -138,6 +138,17 @@ def test_degenerate_roots_stay_undecided(seed):
         assert set(said.verdicts) == {"undecided"}
 
 
+@pytest.mark.parametrize("seed", [12, 59])
+def test_a_root_beside_a_family(seed):
+    problem = singular_problem(np.random.default_rng(seed), 3)
+    roots, mass = enumsol.enumerate_roots(problem, 0.0), np.eye(problem.n)
+    report = verify(problem, roots.stability_proof(mass=mass), mass=mass)
+    assert report.ok, report.failures
+    assert report.verdicts == ("does not run away",)
+    assert not report.complete
+    assert "1 family left out" in repr(report)
+
+
 # -- forgeries ---------------------------------------------------------------------------------------------------------
 
 
@@ -183,22 +194,22 @@ def mutant(rng, records):
 def states_nothing_false(name, count, seed):
     """Mutants of one proof; how many of them were refused."""
     rng = np.random.default_rng(seed)
-    _, _, _, records = known(name)
-    truth = checked(name, records).verdicts
+    _, _, roots, records = known(name)
+    forces = np.array([np.concatenate([root.lambda_n, np.asarray(root.lambda_t).T.ravel()]) for root in roots])
     refused = 0
     for _ in range(count):
-        report = checked(name, mutant(rng, records))
+        forged = mutant(rng, records)
+        report = checked(name, forged)
         refused += not report.ok
-        allowed = [{verdict, "undecided"} for verdict in truth]
-        # records may follow each other in any order
-        if report.ok and len(report.verdicts) == len(truth):
-            assert sorted(report.verdicts) == sorted(truth) or all(
-                verdict in either for verdict, either in zip(report.verdicts, allowed, strict=True)
-            )
-        else:
-            assert not report.ok
+        if not report.ok:
             assert not report.verdicts
             assert "REFUSED" in repr(report)
+            continue
+        points = [np.array(forged[k][1]) for k in certificates(forged) if forged[k][0] == "v"]
+        assert len(points) == len(report.verdicts) == len(roots)
+        for point, verdict in zip(points, report.verdicts, strict=True):
+            truth = roots.verdicts[int(np.argmin(np.max(np.abs(forces - point), axis=1)))].verdict
+            assert verdict in (truth, "undecided")
     return refused
 
 
@@ -302,8 +313,23 @@ def test_too_many_or_too_few_roots_and_footers():
     less[-1] = {"roots": 2, **{v: counts.count(v) for v in ("runs away", "does not run away", "undecided")}}
     assert "something is said of 2" in refusal(name, less)
     assert "missing" in refusal(name, records[:-1])
+    between = copy.deepcopy(records)
+    for forces in (
+        [1e300, 1e300],
+        [float(x) for x in np.mean([records[of_root(records, k)[0]][1] for k in (0, 1)], axis=0)],
+    ):
+        between[own[0]][1] = forces
+        assert "do not tell" in refusal(name, between)
+    between[own[0]][1] = records[of_root(records, 1)[0]][1]
+    assert "about the same root" in refusal(name, between)
     assert "follow" in refusal(name, [*records, records[-1]])
     assert "header" in refusal(name, [records[0] | {"more": 1}, *records[1:]])
+
+
+def test_a_file_of_too_many_certificates(monkeypatch):
+    records = known("coupled 3")[3]
+    monkeypatch.setattr(stability_checker, "_MOST_CERTIFICATES", 1)
+    assert "more than 1 certificates" in refusal("coupled 3", records)
 
 
 def test_a_file_that_asks_for_too_many_ways(monkeypatch):
