@@ -68,6 +68,7 @@ def picture(graph: enumsol.BranchGraph, alpha: float, title: str) -> Any:
     """The branches, and the bodies of all solutions at one alpha: below, slender ones beside."""
     roots = graph.roots_at(alpha)
     verdicts = roots.stability()
+    graph.stability()
     columns = 5
     if len(roots) > 3:
         figure = new_figure(figsize=(10.0, 6.4))
