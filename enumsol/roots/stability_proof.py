@@ -72,8 +72,8 @@ def _certified(asked: Stabilities, root: Root, found: Stability) -> tuple[str, l
         return RUNS_AWAY, [certificate_record(k, certificate)]
     records = []
     for k, (_, proven) in enumerate(parts):
-        known = {id(leaf): leaf for _, _, leaves in proven.ranges for leaf in leaves}
-        records += [certificate_record(k, leaf) for leaf in known.values()]
+        known = dict.fromkeys(leaf for _, _, leaves in proven.ranges for leaf in leaves)
+        records += [certificate_record(k, leaf) for leaf in known]
     return DOES_NOT, records
 
 

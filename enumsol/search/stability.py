@@ -75,7 +75,7 @@ class StabilitySearch:
     stiffness: DynamicStiffness
     motions: Motions
     _ranges: list[tuple[float, float, tuple[NoMotion, ...]]] = field(default_factory=list)
-    _programs: int = 0
+    programs: int = 0
 
     def run(self) -> Proven:
         """Search, and all that is proven."""
@@ -205,7 +205,7 @@ class StabilitySearch:
         """Parts of a range in which weights and decided nodes do not serve either."""
         look()
         leaves = None
-        if self._programs < _PROGRAMS and low < high:
+        if self.programs < _PROGRAMS and low < high:
             limit = self.stiffness.stiffest or self.stiffness.steepest
             at = float(np.sqrt(max(low, 1e-3 * high) * high))
             K = limit if np.isinf(high) else self.stiffness.at(at)
@@ -213,7 +213,7 @@ class StabilitySearch:
         if leaves is not None:
             self._ranges.append((low, high, tuple(leaves)))
             return
-        middle = None if self._programs >= _PROGRAMS else self._middle(low, high, _NARROWEST)
+        middle = None if self.programs >= _PROGRAMS else self._middle(low, high, _NARROWEST)
         if middle is None:
             yield low, high
             return
@@ -224,7 +224,7 @@ class StabilitySearch:
         self, low: float, high: float, K: Floats, slides: tuple[int, ...], stays: tuple[int, ...]
     ) -> list[NoMotion] | None:
         """Certificates for a range that decide nodes at their limit as far as it takes."""
-        if self._programs >= _PROGRAMS:
+        if self.programs >= _PROGRAMS:
             return None
         found = self._weights(K, slides, stays)
         if found is not None:
@@ -245,7 +245,7 @@ class StabilitySearch:
     def _weights(self, K: Floats, slides: tuple[int, ...], stays: tuple[int, ...]) -> tuple[Floats, Floats] | None:
         """Weights and products with which the form is definite at one K, as far as a program finds."""
         k, signed = len(self.motions.signed), self.motions.signed
-        self._programs += 1
+        self.programs += 1
         kept = np.setdiff1d(np.arange(k), stays)
         left, right = self.motions.leaning.mid, self.motions.moves.mid
         unit = 1.0 / np.sqrt(np.abs((right.T @ K @ right).diagonal()))

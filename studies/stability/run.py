@@ -50,7 +50,7 @@ class Watched:
         def watched(search):
             proven = run(search)
             self.ranges += len(proven.ranges)
-            self.programs += search._programs
+            self.programs += search.programs
             self.kinds.append(_kind(proven))
             return proven
 

@@ -91,7 +91,7 @@ def test_units_and_titles_that_are_none(here, capsys, line, said):
         "solve body.toml --alpha 0.5",
         "roots body.toml --alpha 0.5",
         "table body.toml --alphas 0.5",
-        "graph body.toml --from 0 --to 1",
+        "graph body.toml --from 0 --to 1 --no-stability",
         "follow body.toml --from 0 --to 1 --start 0.5",
         "fixed-point body.toml --alpha 0.2",
     ],

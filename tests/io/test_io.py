@@ -237,9 +237,9 @@ def test_a_directory_is_replaced_without_leftovers(tmp_path):
     write_problem(plain, place)
     assert_same(read_problem(place), plain)
     assert (place / "_notes.mtx").exists()
-    (place / "mass.mtx").write_text("of somebody else")
-    bad_problem(r"mass\.mtx is not known", write_problem, plain, place)
-    assert (place / "mass.mtx").exists()
+    (place / "damping.mtx").write_text("of somebody else")
+    bad_problem(r"damping\.mtx is not known", write_problem, plain, place)
+    assert (place / "damping.mtx").exists()
 
 
 def test_a_directory_changes_hands(tmp_path):
