@@ -94,7 +94,7 @@ class SpaceSolvers(SearchSetup):
 
     @cached_property
     def relaxed(self) -> SpaceSystem:
-        """System that the relaxations are about; a body that nothing holds is on weak springs (theory, section 14.5)."""
+        """System of the relaxations; a body that nothing holds is on weak springs (theory, section 14.5)."""
         return self._on_springs(WEAK)
 
     def _on_springs(self, stiffness: float) -> SpaceSystem:
