@@ -34,7 +34,7 @@ from enumsol.proof.stability_records import (
 )
 from enumsol.support.messages import counted
 from enumsol.trusted.motions_of_body import BodyMotions, friction_over
-from enumsol.trusted.running_away import Growing, NoMotion
+from enumsol.trusted.running_away import Growing, NoMotion, covers
 from enumsol.trusted.status_rows import OPEN, STICK
 
 if TYPE_CHECKING:
@@ -52,8 +52,6 @@ _END = object()
 _ABOVE, _BELOW = 1 + 2.0**-40, 1 - 2.0**-40
 #: Certificates of one root: K(mu) is kept at the ends of all their ranges.
 _MOST_CERTIFICATES = 2_000
-#: Ways in which nodes slide or stay that are looked at for one range.
-_MOST_WAYS = 20_000
 
 
 @dataclass
@@ -300,32 +298,6 @@ def _something_may_grow(part: Setting, given: list[Growing | NoMotion]) -> str |
         return "a certificate does not exclude motions in its range"
     ends = sorted({0.0, math.inf, *(leaf.low for leaf in leaves), *(leaf.high for leaf in leaves)})
     for low, high in itertools.pairwise(ends):
-        if not _Ways().covered([leaf for leaf in leaves if leaf.low <= low and high <= leaf.high]):
+        if not covers([leaf for leaf in leaves if leaf.low <= low and high <= leaf.high]):
             return f"motions with growth rates from {math.sqrt(low):.3g} to {math.sqrt(high):.3g} are not excluded"
     return None
-
-
-class _Ways:
-    """Ways in which nodes slide or stay in one range, looked at one after the other, as ``running_away.covers`` does.
-
-    A file could ask for any number of them.
-    """
-
-    def __init__(self) -> None:
-        self._left = _MOST_WAYS
-
-    def covered(
-        self, leaves: list[NoMotion], slides: frozenset[int] = frozenset(), stays: frozenset[int] = frozenset()
-    ) -> bool:
-        """True if every way is one that some leaf is about."""
-        self._left -= 1
-        if self._left < 0:
-            return False
-        fitting = [leaf for leaf in leaves if not stays & {*leaf.slides} and not slides & {*leaf.stays}]
-        if any(slides >= {*leaf.slides} and stays >= {*leaf.stays} for leaf in fitting):
-            return True
-        asked = [i for leaf in fitting for i in (*leaf.slides, *leaf.stays) if i not in slides and i not in stays]
-        if not asked:
-            return False
-        more = frozenset(asked[:1])
-        return self.covered(fitting, slides | more, stays) and self.covered(fitting, slides, stays | more)

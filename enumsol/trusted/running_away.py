@@ -25,6 +25,10 @@ if TYPE_CHECKING:
     from enumsol.support.array_types import Floats, Mask
 
 
+#: Ways in which nodes slide or stay that are looked at for one range of mu: a file could ask for any number of them.
+MOST_WAYS = 20_000
+
+
 class Stiffness(Protocol):
     """K(mu), in balls or, for what is only tried, in floats."""
 
@@ -445,16 +449,23 @@ def everywhere(ranges: Sequence[tuple[float, float, Sequence[NoMotion]]]) -> boo
     return reached == np.inf
 
 
-def covers(
-    leaves: Sequence[NoMotion], slides: frozenset[int] = frozenset(), stays: frozenset[int] = frozenset()
-) -> bool:
-    """True if every way in which nodes at their limit slide or stay is one that some leaf is about."""
-    fitting = [leaf for leaf in leaves if not stays & {*leaf.slides} and not slides & {*leaf.stays}]
-    if any(slides >= {*leaf.slides} and stays >= {*leaf.stays} for leaf in fitting):
-        return True
-    # the leaves ask for something of a node that is not decided
-    asked = [i for leaf in fitting for i in (*leaf.slides, *leaf.stays) if i not in slides and i not in stays]
-    if not asked:
-        return False
-    more = frozenset(asked[:1])
-    return covers(fitting, slides | more, stays) and covers(fitting, slides, stays | more)
+def covers(leaves: Sequence[NoMotion], most: int = MOST_WAYS) -> bool:
+    """True if every way in which nodes slide or stay is one that some leaf is about; at most so many are looked at."""
+    left = most
+
+    def decided(among: Sequence[NoMotion], slides: frozenset[int], stays: frozenset[int]) -> bool:
+        nonlocal left
+        left -= 1
+        if left < 0:
+            return False
+        fitting = [leaf for leaf in among if not stays & {*leaf.slides} and not slides & {*leaf.stays}]
+        if any(slides >= {*leaf.slides} and stays >= {*leaf.stays} for leaf in fitting):
+            return True
+        # the leaves ask for something of a node that is not decided
+        asked = [i for leaf in fitting for i in (*leaf.slides, *leaf.stays) if i not in slides and i not in stays]
+        if not asked:
+            return False
+        more = frozenset(asked[:1])
+        return decided(fitting, slides | more, stays) and decided(fitting, slides, stays | more)
+
+    return decided(leaves, frozenset(), frozenset())

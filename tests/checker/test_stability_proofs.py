@@ -15,7 +15,7 @@ import enumsol
 from enumsol import ContactProblem, InvalidArgumentError, InvalidProblemError, gallery, verify
 from enumsol.checker import stability_checker
 from enumsol.search import stability as search
-from enumsol.trusted.running_away import NoMotion
+from enumsol.trusted.running_away import NoMotion, covers
 
 
 def gallery_problem(name, alpha):
@@ -332,18 +332,16 @@ def test_a_file_of_too_many_certificates(monkeypatch):
     assert "more than 1 certificates" in refusal("coupled 3", records)
 
 
-def test_a_file_that_asks_for_too_many_ways(monkeypatch):
+def test_a_file_that_asks_for_too_many_ways():
     """All ways of five nodes, one by one; where they are too many, nothing is concluded from them."""
     zero = np.zeros((5, 5))
     ways = [[k for k in range(5) if number >> k & 1] for number in range(32)]
     decided = [(tuple(own), tuple(k for k in range(5) if k not in own)) for own in ways]
     leaves = [NoMotion(0.0, 1.0, None, *own, zero, (zero, zero)) for own in decided]
-    assert stability_checker._Ways().covered(leaves)
-    assert not stability_checker._Ways().covered(leaves[:-1])
-    monkeypatch.setattr(stability_checker, "_MOST_WAYS", 62)
-    assert not stability_checker._Ways().covered(leaves)
-    monkeypatch.setattr(stability_checker, "_MOST_WAYS", 63)
-    assert stability_checker._Ways().covered(leaves)
+    assert covers(leaves)
+    assert not covers(leaves[:-1])
+    assert not covers(leaves, most=62)
+    assert covers(leaves, most=63)
 
 
 # -- who writes them ---------------------------------------------------------------------------------------------------
