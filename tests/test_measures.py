@@ -11,8 +11,8 @@ from documents import ROOT
 
 #: A change that lowers a measure lowers its bound; one that has to raise it says why in its commit.
 BOUNDS = {
-    "code lines": 47_148,
-    "classes": 585,
+    "code lines": 47_137,
+    "classes": 584,
     "kinds of records": 20,
     "parameters annotated Any": 94,
     "files": 300,

@@ -9,12 +9,12 @@ import numpy as np
 
 from enumsol.errors import InvalidArgumentError
 from enumsol.model.problem import ContactProblem
-from enumsol.roots.stability import Stabilities
+from enumsol.roots.stability import Stabilities, rate_bounds
 from enumsol.search.growing_motions import GrowingMotions
 from enumsol.search.stability import Proven, StabilitySearch
 from enumsol.support.deadlines import look
 from enumsol.trusted.motions_of_body import friction_over
-from enumsol.trusted.running_away import Growing
+from enumsol.trusted.running_away import Growing, everywhere
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -86,14 +86,15 @@ class ArcStabilities:
             )
         self._problem, self._asked = problem, Stabilities(problem, mass)
         self._constant = not np.any(problem.affine_friction[1])
-        self._hints: list[Proven] = []
+        #: Proofs at some alphas of the arc, by the contact rows of the part that they are about.
+        self._hints: dict[tuple[int, ...], list[Proven]] = {}
 
     def spans(self, arc: Arc) -> tuple[Span, ...]:
         """Verdicts along an arc, from its lower end to its upper one."""
         look()
         if arc.grazing or arc.dimension:
             return (Span(arc.lo, arc.hi, "undecided"),)
-        self._hints = []
+        self._hints = {}
         if self._constant:
             found = self._piece(arc, arc.lo, arc.hi)
             return (found or Span(arc.lo, arc.hi, "undecided"),)
@@ -137,14 +138,15 @@ class ArcStabilities:
 
     def _verdict(self, setting: Setting, at: Setting) -> bool | tuple[float, float]:
         """Bounds of a growth rate in a range of alpha, or whether nothing grows; ``at`` is the same at its middle."""
-        for hint in self._hints:
+        hints = self._hints.setdefault(tuple(setting.rows), [])
+        for hint in hints:
             extended = _extended(hint, setting)
             if extended is not False:
                 return extended
-        if any(_extended(hint, at) is not False for hint in self._hints):
+        if any(_extended(hint, at) is not False for hint in hints):
             return False  # known at the middle: the range is too long
         proven = StabilitySearch(at.stiffness, at.motions).run()
-        self._hints = [proven, *self._hints[:3]]
+        hints[:] = [proven, *hints[:3]]
         return _extended(proven, setting)
 
 
@@ -154,7 +156,7 @@ def _extended(proven: Proven, setting: Setting) -> bool | tuple[float, float]:
     for tried, _ in proven.growing:
         crossing = GrowingMotions(stiffness, motions).crossing_near(tried)
         if crossing is not None:
-            return float(np.sqrt(crossing.low) * (1 - 2.0**-50)), float(np.sqrt(crossing.high) * (1 + 2.0**-50))
+            return rate_bounds(crossing.low, crossing.high)
         at = GrowingMotions(stiffness, motions).zero_near(tried)
         if at is None:
             continue
@@ -164,8 +166,8 @@ def _extended(proven: Proven, setting: Setting) -> bool | tuple[float, float]:
             low, high = (float(np.exp2(step * (below + k))) for k in (0, 1 if place - below < 0.75 else 2))
             wider = Growing(low, high, tried.slides, tried.touching)
             if wider.found(stiffness, motions) is not None:
-                return float(np.sqrt(low) * (1 - 2.0**-50)), float(np.sqrt(high) * (1 + 2.0**-50))
-    if proven.growing or proven.gaps:
+                return rate_bounds(low, high)
+    if proven.growing or proven.gaps or not everywhere(proven.ranges):
         return False
     return all(leaf.holds(stiffness, motions) for _, _, leaves in proven.ranges for leaf in leaves)
 

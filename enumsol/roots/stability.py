@@ -153,7 +153,8 @@ class Stabilities:
             if not (proven.growing or proven.gaps or everywhere(proven.ranges)):
                 gaps.append((0.0, np.inf))
             for _, motion in proven.growing:
-                found.append((*_growth(motion.mu), self._shape(setting, motion)))
+                rate = float(np.sqrt(0.5 * sum(motion.mu)))
+                found.append((rate, rate_bounds(*motion.mu), self._shape(setting, motion)))
         if found:
             found.sort(key=lambda item: -item[0])
             rates, bounds, shapes = zip(*found, strict=True)
@@ -231,10 +232,9 @@ class Stabilities:
         return whole
 
 
-def _growth(mu: tuple[float, float]) -> tuple[float, tuple[float, float]]:
-    """A growth rate, and its bounds, from bounds of its square."""
-    low, high = np.sqrt(mu[0]) * (1 - 2.0**-50), np.sqrt(mu[1]) * (1 + 2.0**-50)
-    return float(np.sqrt(0.5 * (mu[0] + mu[1]))), (float(low), float(high))
+def rate_bounds(low: float, high: float) -> tuple[float, float]:
+    """Bounds of a growth rate, from bounds of its square."""
+    return float(np.sqrt(low) * (1 - 2.0**-50)), float(np.sqrt(high) * (1 + 2.0**-50))
 
 
 def displacement(setting: Setting, mu: float, load: Floats, forces: Floats) -> Floats:

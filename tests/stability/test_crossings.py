@@ -5,6 +5,7 @@ import dataclasses
 import numpy as np
 import pytest
 import scipy.linalg
+import scipy.sparse as sp
 from growing_motions import growing_motions
 from linear_motions import random_motion, setting
 
@@ -96,3 +97,33 @@ def test_verdicts_along_arcs_are_those_of_their_roots():
             if span.growth is not None:
                 (found,) = [enumsol.stability(problem, root) for root in there]
                 assert span.growth[0] <= found.growth_rates[0] <= span.growth[1]
+
+
+def test_parts_of_a_body_do_not_share_what_is_known_of_them():
+    """A proof about two nodes at their limit is of no use for a part with one, and is not tried there."""
+    two, one = enumsol.gallery.get("two-node-5").build(), enumsol.gallery.one_node_triangle()
+    blocks = [sp.block_diag([getattr(body, name) for body in (two, one)]) for name in ("A", "Bn", "Bt")]
+    problem = enumsol.ContactProblem(
+        *blocks, np.concatenate([two.f, one.f]), friction=0, friction_slope=1, mass=np.eye(two.n + one.n)
+    )
+    graph = enumsol.branch_graph(problem, (3.05, 3.5))
+    for arc, spans in zip(graph.arcs, graph.stability(), strict=True):
+        for span in spans:
+            alpha = 0.5 * (span.low + span.high)
+            (root,) = [root for root in graph.roots_at(alpha) if root.statuses == arc.statuses]
+            assert span.verdict in (enumsol.stability(problem, root).verdict, "undecided")
+
+
+def test_ranges_with_a_gap_exclude_nothing_along_an_arc(monkeypatch):
+    problem = enumsol.gallery.get("brake-shoe-9").build()
+    graph = enumsol.branch_graph(problem, (0.36, 0.37))
+    arc = next(arc for arc in graph.arcs if arc.index == 1 and any("slip" in of.value for of in arc.statuses))
+    assert {span.verdict for span in ArcStabilities(problem).spans(arc)} == {"does not run away"}
+    run = StabilitySearch.run
+
+    def with_a_gap(search):
+        proven = run(search)
+        return dataclasses.replace(proven, ranges=proven.ranges[1:])
+
+    monkeypatch.setattr(StabilitySearch, "run", with_a_gap)
+    assert {span.verdict for span in ArcStabilities(problem).spans(arc)} == {"undecided"}
