@@ -44,6 +44,9 @@ In 3D both take ``Bt1`` and ``Bt2`` instead of ``Bt``, which tell a problem in 3
 ``.vtu``
     Displacements, contact forces and stresses of solutions in 2D and 3D, for ParaView: `enumsol.write_vtu`, by meshio.
 
+``.frd``
+    The same for CGX, `enumsol.write_frd`; and displacements that CalculiX computed: `enumsol.read_results`.
+
 NumPy archives and MatrixMarket directories give every number back bit by bit. Pickled objects are never loaded.
 """
 
