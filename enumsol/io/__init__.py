@@ -56,6 +56,12 @@ from typing import TYPE_CHECKING, Any
 
 from enumsol.errors import InvalidArgumentError, InvalidProblemError
 from enumsol.io import fclib, matrix_market, npz
+from enumsol.io.assembled import (
+    AssembledStiffness,
+    read_abaqus_stiffness,
+    read_ansys_stiffness,
+    read_calculix_stiffness,
+)
 from enumsol.model.problem import check_is_problem
 from enumsol.support.arguments import file_path
 from enumsol.support.files import writing
@@ -66,7 +72,14 @@ if TYPE_CHECKING:
 
     from enumsol.model.problem3d import AnyProblem
 
-__all__ = ["read_problem", "write_problem"]
+__all__ = [
+    "AssembledStiffness",
+    "read_abaqus_stiffness",
+    "read_ansys_stiffness",
+    "read_calculix_stiffness",
+    "read_problem",
+    "write_problem",
+]
 
 _A_PLACE = "the name of a file or directory"
 #: Endings of the files that hold a problem.
