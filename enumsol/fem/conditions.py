@@ -195,7 +195,7 @@ def supports_of(mesh: PartedMesh, options: Options) -> Supports:
         One names no part or is not of its form, or they contradict each other.
     """
     shape = mesh.points.shape
-    found = Supports(np.zeros(shape, dtype=bool), np.zeros(shape), np.zeros(shape, dtype=bool))
+    found = Supports.none(shape)
     for part in names_of(options.clamp, "clamp"):
         for component in range(shape[1]):
             _fix(found, part, mesh.nodes(part), component, 0.0)
