@@ -260,8 +260,8 @@ def problem_of(
     Raises
     ------
     InvalidArgumentError
-        An axis is oblique to the plane of symmetry on which its node lies, supports and equations contradict each other,
-        or contact rows depend on each other by them.
+        An axis is oblique to the plane of symmetry on which its node lies, supports and equations contradict each
+        other, or contact rows depend on each other by them.
     InvalidProblemError
         The body is free to move as a rigid body, or the data are not admissible.
     """

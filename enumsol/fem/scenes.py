@@ -42,7 +42,7 @@ if TYPE_CHECKING:
 
 #: Options that say what a part of the boundary is for.
 _USES = (
-    *("contact", "clamp", "symmetry", "displacement", "spring"),
+    *("contact", "clamp", "symmetry", "displacement", "displacement_slope", "spring"),
     *("load", "load_slope", "pressure", "pressure_slope", "force", "force_slope"),
 )
 

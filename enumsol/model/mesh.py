@@ -139,7 +139,7 @@ class BodyMesh(Immutable):
     def acting(self) -> sp.csr_array:
         """Forces on nodes that stand for forces on u, sparse (d N, n): ``motion.T @ acting`` is the identity.
 
-        A force on the component of a node acts on this node alone; others are spread over the nodes that move with them.
+        A force on the component of a node acts on this node alone; others are spread over nodes that move with them.
         """
         motion = self.motion
         lone = np.flatnonzero(np.diff(motion.indptr) == 1)
