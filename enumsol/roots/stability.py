@@ -91,7 +91,7 @@ def stability(
     Raises
     ------
     InvalidArgumentError
-        There is no mass, friction depends on the solution, or ``root`` is no root of this problem.
+        There is no mass, friction depends on the solution, or ``root`` is no isolated root of this problem.
     InvalidProblemError
         The mass cannot be used.
 
@@ -124,9 +124,8 @@ class Equilibria:
     def check(self, root: Root) -> None:
         """Refuse what is no root of this problem."""
         if not hasattr(root, "enclosure"):
-            raise InvalidArgumentError(
-                f"root is {shown(root)}; expected a root of enumerate_roots, not a family of them"
-            )
+            family = "a family of solutions" if hasattr(root, "polytopes") else shown(root)
+            raise InvalidArgumentError(f"root is {family}; expected an isolated root of enumerate_roots")
         if root.problem is not self.problem and root.problem.fingerprint != self.problem.fingerprint:
             raise InvalidArgumentError("root solves another problem; expected one of enumerate_roots(problem, alpha)")
 
