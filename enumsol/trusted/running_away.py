@@ -223,7 +223,7 @@ class NoMotion:
 
 @dataclass(frozen=True)
 class Behaviour:
-    """What the nodes of a part of the body do: which of those at their limit slide, and statuses of those that touch.
+    """Statuses of the nodes at their limit, as those that slide, and of those that touch, in one part of the body.
 
     Attributes
     ----------
