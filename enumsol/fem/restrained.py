@@ -186,7 +186,7 @@ class Body:
         load_slope = None if slope is None else nodal_vectors(slope, "forces_slope", held.shape)
         return cls(A, f, load_slope, replace(Supports.none(held.shape), fixed=held))
 
-    def by_rows(self, values: Floats) -> Any:
+    def by_rows(self, values: Floats | Mask) -> Any:
         """Values of nodes, (N, dimension), by rows of A; 0 for rows of other things."""
         found = np.zeros(len(self.f), dtype=values.dtype)
         found[plain_dofs(values.shape) if self.dofs is None else self.dofs] = values
@@ -201,8 +201,8 @@ class Body:
             They contradict each other.
         """
         given = self.supports
-        values = (self.by_rows(own) for own in (given.fixed, given.values, given.slopes))
-        return eliminated(*values, self.equations, self.by_rows(apart), self.named)
+        fixed, values, slopes = (self.by_rows(own) for own in (given.fixed, given.values, given.slopes))
+        return eliminated(fixed, values, slopes, self.equations, self.by_rows(apart), self.named)
 
 
 def displacements_along(means: sp.csr_array, directions: Floats, dofs: Integers, count: int) -> sp.csr_array:

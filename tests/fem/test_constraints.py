@@ -127,5 +127,5 @@ def test_contact_nodes_that_move_with_alpha_where_nothing_follows_are_refused():
     mesh = grid(3, 2, 4)
     bad_argument(
         "contact node 0 is held or displaced in some components only",
-        fem.mesh_problem, mesh, **STEEL, clamp="top", displacement_slope={"left": (1.0, "free")},
+        fem.mesh_problem, mesh, **STEEL, spring={"top": (1, 1)}, displacement_slope={"left": (1.0, "free")},
     )  # fmt: skip
