@@ -1,0 +1,72 @@
+"""Do the displacements of CalculiX, with its penalties, and of enumsol converge to each other on the same decks?
+
+Twelve decks, one for each type of element: a block that is pressed on a slab and pushed along it, in the plane and in
+3D, and a ring with a press fit on a shaft and on a cone, axisymmetric. Both programs read the same file, on meshes that
+are refined twice. CalculiX takes contact from surface to surface with a penalty, and enumsol from node to surface,
+exactly; friction is Coulomb's in both, with a stiffness of stick in CalculiX.
+
+Read ``difference``: the largest difference of the displacement of a node, in parts of the largest displacement. It
+should fall with the size of the cells. ``roots`` is the number of equilibria, all proven; ``audit`` whether the result
+of CalculiX was recognised as one of them. Needs CalculiX (``ccx``); without it its columns are empty.
+"""
+
+from __future__ import annotations
+
+import shutil
+import subprocess
+import tempfile
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import enumsol
+from against_calculix.decks import CASES, SOLID
+
+if TYPE_CHECKING:
+    from shared.results import Run
+
+ABSENT = "CalculiX is not installed: its results are left out"
+#: Cells along the block.
+PLANE_SIZES, SOLID_SIZES = (2, 4, 8), (1, 2, 3)
+
+
+def compared(name, cells, folder):
+    """One row of a deck."""
+    make, kind = CASES[name]
+    file = Path(folder) / f"{name.replace(' ', '_')}_{cells}.inp"
+    file.write_text(make(kind, cells))
+    problem = enumsol.read_deck(file).problem()
+    roots = enumsol.enumerate_roots(problem, 0)
+    row = {"deck": name, "cells": cells, "n": problem.n, "p": problem.p, "roots": len(roots), "complete": roots.complete}
+    if shutil.which("ccx") is None:
+        return row | {"difference": "-", "audit": "-"}
+    done = subprocess.run(["ccx", file.stem], cwd=folder, capture_output=True, text=True, check=False)  # noqa: S607
+    if "Job finished" not in done.stdout or "ERROR" in done.stdout:
+        return row | {"difference": "-", "audit": "CalculiX found no result"}
+    result = enumsol.read_results(file.with_suffix(".dat"))[-1]
+    audit = enumsol.compare_result(problem, roots, result.on(problem.mesh, numbers_of(file)))
+    return row | {"difference": min(audit.distances.values()), "audit": audit.found is not None}
+
+
+def conclusion(rows):
+    """How the differences fall from mesh to mesh."""
+    if shutil.which("ccx") is None:
+        return ABSENT
+    by_deck = {}
+    for row in rows:
+        by_deck.setdefault(row["deck"], []).append(row["difference"])
+    falls = [name for name, values in by_deck.items() if values[-1] < values[0]]
+    last = [values[-1] for values in by_deck.values()]
+    return (
+        f"Conclusion: on the finest meshes the displacements differ by {100 * min(last):.2g} to {100 * max(last):.2g} % of "
+        f"the largest; the difference falls with the size of the cells on {len(falls)} of {len(by_deck)} decks."
+    )
+
+
+def main(run: Run) -> None:
+    with tempfile.TemporaryDirectory() as folder:
+        rows = [
+            compared(name, cells, folder)
+            for name, (_, kind) in CASES.items()
+            for cells in (SOLID_SIZES if kind in SOLID else PLANE_SIZES)[: 1 if run.smoke else None]
+        ]
+    run.table("against_calculix", rows, conclusion(rows))
