@@ -267,7 +267,7 @@ class BranchGraph(GraphData):
             asked = ArcStabilities(self.problem, mass)
             found = self._found.setdefault("verdicts", []) if mass is None else []
             for arc in self.arcs[len(found) :]:
-                found.append(asked.spans(arc))
+                found.append(asked.spans(arc, self.arcs))
             self._found["verdicts"] = found
         return self.verdicts or ()
 

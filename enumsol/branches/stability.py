@@ -7,8 +7,6 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from enumsol.errors import InvalidArgumentError
-from enumsol.model.problem import ContactProblem
 from enumsol.roots.stability import Stabilities, rate_bounds
 from enumsol.search.growing_motions import GrowingMotions
 from enumsol.search.stability import Proven, StabilitySearch
@@ -17,11 +15,12 @@ from enumsol.trusted.motions_of_body import friction_over
 from enumsol.trusted.running_away import Growing, everywhere
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
+    from collections.abc import Iterator, Sequence
 
     import scipy.sparse as sp
 
     from enumsol.branches.elements import Arc
+    from enumsol.branches.space.slip_directions import SlipDirections
     from enumsol.model.problem3d import AnyProblem
     from enumsol.roots.stability import Verdict
     from enumsol.support.array_types import ArrayLike
@@ -62,40 +61,40 @@ class Span:
 
 
 class ArcStabilities:
-    """Verdicts on arcs of one problem in 2D.
+    """Verdicts on arcs of one problem.
 
     Parameters
     ----------
-    problem : ContactProblem
+    problem : ContactProblem or ContactProblem3D
     mass : (n, n) array_like or sparse, or None
         In place of ``problem.inertia``.
 
     Raises
     ------
     InvalidArgumentError
-        The problem is one in 3D, or has no mass.
+        The problem has no mass.
     InvalidProblemError
         The mass cannot be used.
     """
 
     def __init__(self, problem: AnyProblem, mass: ArrayLike | sp.sparray | sp.spmatrix | None = None) -> None:
-        if not isinstance(problem, ContactProblem):
-            raise InvalidArgumentError(
-                "the graph is one in 3D, where directions of slip change along an arc; expected one in 2D, or "
-                "graph.roots_at(alpha).stability()"
-            )
         self._problem, self._asked = problem, Stabilities(problem, mass)
         self._constant = not np.any(problem.affine_friction[1])
         #: Proofs at some alphas of the arc, by the contact rows of the part that they are about.
         self._hints: dict[tuple[int, ...], list[Proven]] = {}
+        self._directions: SlipDirections | None = None
 
-    def spans(self, arc: Arc) -> tuple[Span, ...]:
-        """Verdicts along an arc, from its lower end to its upper one."""
+    def spans(self, arc: Arc, arcs: Sequence[Arc] = ()) -> tuple[Span, ...]:
+        """Verdicts along an arc, from its lower end to its upper one; ``arcs`` are all of its graph, for 3D."""
         look()
         if arc.grazing or arc.dimension:
             return (Span(arc.lo, arc.hi, "undecided"),)
         self._hints = {}
-        if self._constant:
+        if self._asked.body.tangents > 1:
+            from enumsol.branches.space.slip_directions import SlipDirections  # for graphs in 3D only
+
+            self._directions = SlipDirections(arc, arcs)
+        if self._constant and (self._directions is None or not self._directions.turning):
             found = self._piece(arc, arc.lo, arc.hi)
             return (found or Span(arc.lo, arc.hi, "undecided"),)
         first = _joined(self._halved(arc, arc.lo, arc.hi, _HALVINGS))
@@ -124,10 +123,10 @@ class ArcStabilities:
 
     def _piece(self, arc: Arc, low: float, high: float) -> Span | None:
         """The verdict in a part of an arc, if it is one that can be proven there at once."""
-        active = [frozenset({status}) for status in arc.statuses]
-        whole = list(self._asked.settings_of(active, friction_over(self._problem, low, high)))
         middle = 0.5 * (low + high)
-        at = list(self._asked.settings_of(active, friction_over(self._problem, middle, middle)))
+        whole, at = self._settings(arc, low, high), self._settings(arc, middle, middle)
+        if whole is None or at is None:
+            return None
         quiet = True
         for k, setting in enumerate(whole):
             verdict = self._verdict(setting, at[k])
@@ -135,6 +134,17 @@ class ArcStabilities:
                 return Span(low, high, "runs away", verdict)
             quiet = quiet and verdict
         return Span(low, high, "does not run away") if quiet else None
+
+    def _settings(self, arc: Arc, low: float, high: float) -> list[Setting] | None:
+        """Parts of the body for all alpha of a range, or, in floats in 3D, at one; None where they are not enclosed."""
+        active = [frozenset({status}) for status in arc.statuses]
+        known = self._directions
+        directions = None
+        if known is not None:
+            directions = known.at(low) if low == high else known.over(low, high)
+            if directions is None:
+                return None
+        return list(self._asked.settings_of(active, friction_over(self._problem, low, high), directions))
 
     def _verdict(self, setting: Setting, at: Setting) -> bool | tuple[float, float]:
         """Bounds of a growth rate in a range of alpha, or whether nothing grows; ``at`` is the same at its middle."""

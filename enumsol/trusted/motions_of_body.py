@@ -97,12 +97,17 @@ class BodyMotions:
         first = np.array([of_nodes.indices[of_nodes.indptr[i]] for i in range(problem.p)])
         self._node_part = together[first]
         self._stiffness: dict[Any, DynamicStiffness] = {}
+        # F0 and F1 of F0 + alpha F1, by node and axis
+        first, slope = (np.asarray(part).reshape(problem.p, -1).tolist() for part in problem.affine_friction)
+        self._friction = [
+            [(Fraction(x), Fraction(y)) for x, y in zip(*pair, strict=True)] for pair in zip(first, slope, strict=True)
+        ]
 
     def settings(
         self,
         held: Sequence[Collection[int]],
         F: list[Ball],
-        forces: Floats | None = None,
+        directions: Ball | None = None,
         unsure: tuple[int, ...] = (),
         *,
         every: bool = False,
@@ -115,8 +120,8 @@ class BodyMotions:
             Per node the codes of the statuses that hold; in 3D any one but open and stick means slip.
         F : list of Balls (p,)
             Coefficients by axis.
-        forces : (p, 2, 2) array, optional
-            In 3D: bounds of lambda_t.
+        directions : Ball (p, 2), optional
+            In 3D: lambda_t / F by axis, up to a positive factor for every node.
         unsure : tuple of int
             Nodes of which bounds leave open whether they are at their limit.
         """
@@ -125,7 +130,7 @@ class BodyMotions:
             nodes = np.flatnonzero(self._node_part == part).tolist()
             kinds = {i: _kind(held[i], rubs[i]) for i in nodes}
             if every or "limit" in kinds.values():
-                moves = {i: _limit(held[i], F, i, forces) for i, kind in kinds.items() if kind == "limit"}
+                moves = {i: self._limit(held[i], F, i, directions) for i, kind in kinds.items() if kind == "limit"}
                 yield self._setting(F, int(part), kinds, moves, unsure)
 
     def _setting(
@@ -167,6 +172,33 @@ class BodyMotions:
             tuple(k for k, i in enumerate(moves) if i in unsure),
         )
         return Setting(self._stiffness_of(part, dofs, rows), motions, dofs, rows, list(moves))
+
+    def _limit(
+        self, held: Collection[int], F: list[Ball], i: int, directions: Ball | None
+    ) -> tuple[list[Ball], Ball]:
+        """Tangential move of a node at its limit, by axis, and by how much T_i sinks meanwhile (theory, (15.3))."""
+        if len(F) == 1:
+            sign = 1.0 if SLIP_PLUS in held else -1.0
+            return [Ball.exact(np.array(sign))], F[0][i]
+        assert directions is not None
+        first = next(k for k, f in enumerate(F) if f.mid[i] > 0)
+        d = unit_vector(directions[i])
+        return [d[k] * self._ratio(F, i, first, k) for k in range(len(F))], F[first][i]
+
+    def _ratio(self, F: list[Ball], i: int, first: int, k: int) -> Ball:
+        """The coefficient along one axis over that along another one; zero where there is no friction."""
+        if k == first:
+            return Ball.exact(np.array(1.0))
+        if F[k].mid[i] == 0:
+            # no force is along that axis
+            return Ball.exact(np.array(0.0))
+        (above, rate), (below, other) = self._friction[i][first], self._friction[i][k]
+        if above * other != below * rate:
+            return F[first][i] * _inverse(F[k][i])
+        # for all alpha
+        exact = above / below if below else rate / other
+        value = float(exact)
+        return Ball(np.array(value), np.array(0.0 if Fraction(value) == exact else 2 * UNIT * abs(value) + TINY))
 
     def _stiffness_of(self, part: int, dofs: Integers, rows: list[int]) -> DynamicStiffness:
         """Stiffness of some rows of a part."""
@@ -211,24 +243,23 @@ def _kind(held: Collection[int], friction: bool) -> str:
     return "limit" if friction and codes != {STICK} else "stuck"
 
 
-def _limit(held: Collection[int], F: list[Ball], i: int, forces: Floats | None) -> tuple[list[Ball], Ball]:
-    """Tangential move of a node at its limit, by axis, and by how much T_i sinks meanwhile (theory, (15.3))."""
-    if len(F) == 1:
-        sign = 1.0 if SLIP_PLUS in held else -1.0
-        return [Ball.exact(np.array(sign))], F[0][i]
-    assert forces is not None
-    inverse = [_inverse(f[i]) for f in F]
-    force = [Ball(0.5 * (low + high), 0.5 * (high - low) * SAFE + TINY) for low, high in forces[i]]
-    shares = [x * y for x, y in zip(force, inverse, strict=True)]
-    length = float(np.hypot(*(x.mid for x in shares))) or TINY
-    # |v / |v| - m / |m|| <= 2 |v - m| / |m|
-    off = 2.0 * float(np.hypot(*(x.rad for x in shares))) / length * SAFE + 8 * UNIT
-    typical = max(float(f.mid[i]) for f in F)
-    moves = [
-        Ball(np.array(typical * float(x.mid) / length), np.array(typical * off * SAFE)) * y
-        for x, y in zip(shares, inverse, strict=True)
-    ]
-    return moves, Ball.exact(np.array(typical))
+def friction_directions(forces: Floats, F: list[Ball]) -> Ball:
+    """lambda_t / F by axis, (p, 2), from bounds of lambda_t, (p, 2, 2); zero along axes without friction."""
+    low, high = forces[..., 0], forces[..., 1]
+    found = Ball(0.5 * (low + high), 0.5 * (high - low) * SAFE + TINY)
+    for k, f in enumerate(F):
+        for i in range(len(found.mid)):
+            found[i, k] = found[i, k] * _inverse(f[i])
+    return found
+
+
+def unit_vector(v: Ball) -> Ball:
+    """The directions of all vectors in a ball, (2,)."""
+    length = float(np.hypot(*v.mid)) or TINY
+    share = float(np.hypot(*v.rad)) / length * SAFE
+    # the angle has at most this sine, and the chord to it is so much longer
+    off = share * np.sqrt(2.0 / (1.0 + np.sqrt(1.0 - share * share))) if share < 1 else 2.0
+    return Ball(v.mid / length, np.full(2, off * SAFE + 8 * UNIT))
 
 
 def _inverse(F: Ball) -> Ball:
