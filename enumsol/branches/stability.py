@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import heapq
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -15,7 +16,7 @@ from enumsol.trusted.motions_of_body import friction_over
 from enumsol.trusted.running_away import Growing, everywhere
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Sequence
+    from collections.abc import Sequence
 
     import scipy.sparse as sp
 
@@ -26,8 +27,9 @@ if TYPE_CHECKING:
     from enumsol.support.array_types import ArrayLike
     from enumsol.trusted.motions_of_body import Setting
 
-#: Parts of an arc in which nothing is proven at once are halved so often, and those where a verdict changes once more.
-_HALVINGS = 6
+#: Parts of an arc that are tried, which decides how much time an arc costs along which nothing is proven; and how short
+#: they are at the end, relative to the arc, about an alpha at which the verdict changes.
+_PARTS, _SHORTEST = 160, 2.0**-12
 #: Growing motions of a range of alpha are looked for between such powers of two: K(mu) is enclosed at few mu then.
 _GRIDS = (1 / 32, 1 / 8, 1 / 2)
 
@@ -97,29 +99,23 @@ class ArcStabilities:
         if self._constant and (self._directions is None or not self._directions.turning):
             found = self._piece(arc, arc.lo, arc.hi)
             return (found or Span(arc.lo, arc.hi, "undecided"),)
-        first = _joined(self._halved(arc, arc.lo, arc.hi, _HALVINGS))
-        return tuple(_joined(self._refined(arc, first)))
+        return tuple(_joined(self._divided(arc)))
 
-    def _refined(self, arc: Arc, spans: list[Span]) -> Iterator[Span]:
-        """The same, with the places where the verdict changes known more closely."""
-        for k, span in enumerate(spans):
-            beside = {other.verdict for other in (*spans[max(k - 1, 0) : k], *spans[k + 1 : k + 2])}
-            if span.verdict == "undecided" and len(beside) == 2:
-                yield from self._halved(arc, span.low, span.high, _HALVINGS)
+    def _divided(self, arc: Arc) -> list[Span]:
+        """Verdicts in parts of an arc, halved where nothing is proven, the longest first."""
+        left, found = [(-arc.length, arc.lo, arc.hi)], list[Span]()
+        for _ in range(_PARTS):
+            if not left:
+                break
+            look()
+            _, low, high = heapq.heappop(left)
+            known, middle = self._piece(arc, low, high), 0.5 * (low + high)
+            if known is None and high - low > _SHORTEST * arc.length and low < middle < high:
+                for ends in ((low, middle), (middle, high)):
+                    heapq.heappush(left, (ends[0] - ends[1], *ends))
             else:
-                yield span
-
-    def _halved(self, arc: Arc, low: float, high: float, halvings: int) -> Iterator[Span]:
-        """Verdicts in a part of an arc, halved as often as it takes."""
-        look()
-        found, middle = self._piece(arc, low, high), 0.5 * (low + high)
-        if found is not None:
-            yield found
-        elif not halvings or not low < middle < high:
-            yield Span(low, high, "undecided")
-        else:
-            yield from self._halved(arc, low, middle, halvings - 1)
-            yield from self._halved(arc, middle, high, halvings - 1)
+                found.append(known or Span(low, high, "undecided"))
+        return sorted((*found, *(Span(low, high, "undecided") for _, low, high in left)), key=lambda span: span.low)
 
     def _piece(self, arc: Arc, low: float, high: float) -> Span | None:
         """The verdict in a part of an arc, if it is one that can be proven there at once."""
@@ -182,7 +178,7 @@ def _extended(proven: Proven, setting: Setting) -> bool | tuple[float, float]:
     return all(leaf.holds(stiffness, motions) for _, _, leaves in proven.ranges for leaf in leaves)
 
 
-def _joined(spans: Iterator[Span]) -> list[Span]:
+def _joined(spans: Sequence[Span]) -> list[Span]:
     """Neighbours with the same verdict as one."""
     joined: list[Span] = []
     for span in spans:

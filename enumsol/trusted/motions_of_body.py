@@ -182,8 +182,8 @@ class BodyMotions:
             return [Ball.exact(np.array(sign))], F[0][i]
         assert directions is not None
         first = next(k for k, f in enumerate(F) if f.mid[i] > 0)
-        d = unit_vector(directions[i])
-        return [d[k] * self._ratio(F, i, first, k) for k in range(len(F))], F[first][i]
+        d, length = direction(directions[i])
+        return [d[k] * self._ratio(F, i, first, k) for k in range(len(F))], F[first][i] * length
 
     def _ratio(self, F: list[Ball], i: int, first: int, k: int) -> Ball:
         """The coefficient along one axis over that along another one; zero where there is no friction."""
@@ -253,13 +253,17 @@ def friction_directions(forces: Floats, F: list[Ball]) -> Ball:
     return found
 
 
-def unit_vector(v: Ball) -> Ball:
-    """The directions of all vectors in a ball, (2,)."""
+def direction(v: Ball) -> tuple[Ball, Ball]:
+    """The directions of all vectors in a ball, (2,): vectors with a part of one along its middle, and their lengths."""
     length = float(np.hypot(*v.mid)) or TINY
-    share = float(np.hypot(*v.rad)) / length * SAFE
-    # the angle has at most this sine, and the chord to it is so much longer
-    off = share * np.sqrt(2.0 / (1.0 + np.sqrt(1.0 - share * share))) if share < 1 else 2.0
-    return Ball(v.mid / length, np.full(2, off * SAFE + 8 * UNIT))
+    sine = float(np.hypot(*v.rad)) / length * SAFE
+    x, y = v.mid / length
+    if not sine < 0.99:
+        # any unit vector
+        return Ball(np.array([x, y]), np.full(2, 3.0)), Ball.exact(np.array(1.0))
+    cosine = np.sqrt(1.0 - sine * sine)
+    aside = np.abs([y, x]) * (sine / cosine * SAFE) + 8 * UNIT
+    return Ball(np.array([x, y]), aside), Ball(np.array(1.0), np.array((1.0 / cosine - 1.0) * SAFE + 8 * UNIT))
 
 
 def _inverse(F: Ball) -> Ball:

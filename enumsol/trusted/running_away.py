@@ -8,6 +8,7 @@ its limit r_i = F y_n - s y_t = T_i'K(mu) R x is at least zero, too, and x_i r_i
 
 from __future__ import annotations
 
+import itertools
 from dataclasses import dataclass
 from fractions import Fraction
 from functools import cached_property
@@ -240,22 +241,29 @@ def rates_in(K: Ball, motions: Motions, held: Ball, slides: Sequence[int]) -> tu
         Whether they do, strictly; False: no solution has them slide. None: neither is proven. y (m,) are the rates of
         the forces.
     """
-    own, k = list(slides), len(motions.signed)
     # r = -T'y and y = held - K R x
-    first = -(motions.slopes.T @ Ball(held.mid[:, None], held.rad[:, None]))
-    x = Ball.exact(np.zeros(k))
+    first = -(motions.slopes.T @ Ball(held.mid[:, None], held.rad[:, None]))[:, 0]
+    answer, x = _complementary(_across(motions.slopes, K, motions.moves), first, slides)
+    if x is None:
+        return None, held
+    return answer, held - (K @ (motions.moves @ Ball(x.mid[:, None], x.rad[:, None])))[:, 0]
+
+
+def _complementary(L: Ball, q: Ball, slides: Sequence[int]) -> tuple[bool | None, Ball | None]:
+    """Whether x > 0 where nodes slide and r = q + L x > 0 elsewhere, and that x; False if not even >= 0."""
+    own, x = list(slides), Ball.exact(np.zeros(len(q.mid)))
     if own:
-        moved = solution(_across(motions.slopes[:, own], K, motions.moves[:, own]), -first[own])
+        at = np.ix_(own, own)
+        moved = solution(L[at], -Ball(q.mid[own, None], q.rad[own, None]))
         if moved is None:
-            return None, held
+            return None, None
         x[own] = moved[:, 0]
-    y = held - (K @ (motions.moves @ Ball(x.mid[:, None], x.rad[:, None])))[:, 0]
-    r = -(motions.slopes.T @ Ball(y.mid[:, None], y.rad[:, None]))[:, 0]
-    rest = [i for i in range(motions.limits) if i not in own]
+    r = q + (L @ Ball(x.mid[:, None], x.rad[:, None]))[:, 0]
+    rest = [i for i in range(len(q.mid)) if i not in own]
     signs = Ball.joined(x[own], r[rest])
     if np.any(signs.mid + signs.rad < 0):
-        return False, y
-    return (True if np.all(signs.mid - signs.rad > 0) else None), y
+        return False, x
+    return (True if np.all(signs.mid - signs.rad > 0) else None), x
 
 
 @dataclass(frozen=True, eq=False)
@@ -373,28 +381,55 @@ class Crossing:
     ----------
     low, high : float
         Some motion grows for a mu between them.
-    push : (k,) array, >= 0
-        Rows r with these weights are negative at ``low`` for all x >= 0 but zero.
+    push : (k,) array, >= 0, or None
+        Rows r with these weights are negative at one end for all x >= 0 but zero; at the other the form is definite.
+    load : (k,) array or None
+        In place of ``push``: the ways in which the nodes go on under r = load at that end do not add up to one.
     """
 
     low: float
     high: float
-    push: Floats
+    push: Floats | None = None
+    load: Floats | None = None
 
     def holds(self, stiffness: Stiffness, motions: Motions) -> bool:
         """True if it is proven; only where no node touches and all are at their limit for certain."""
-        if motions.touching or motions.unsure or not 0 <= self.low < self.high < np.inf:
+        if motions.touching or motions.unsure or not 0 <= self.low < self.high < np.inf or not motions.limits:
             return False
-        if self.push.shape != (motions.limits,) or not np.all(np.isfinite(self.push)) or np.any(self.push < 0):
+        numbers = self.load if self.push is None else self.push
+        if numbers is None or numbers.shape != (motions.limits,) or not np.all(np.isfinite(numbers)):
             return False
-        first, last = stiffness.at(self.low), stiffness.at(self.high)
-        if first is None or last is None or not motions.limits:
-            return False
+        ends = [(mu, stiffness.at(mu)) for mu in (self.low, self.high)]
         with np.errstate(all="ignore"):
-            pushed = Ball.exact(self.push[None]) @ _across(motions.slopes, first, motions.moves)
-            return bool(np.all(pushed.mid + pushed.rad < 0)) and positive(
-                _across(motions.slopes, last, motions.moves).symmetric
+            forms = [(mu, _across(motions.slopes, K, motions.moves)) for mu, K in ends if K is not None]
+            return len(forms) == len(ends) and any(
+                positive(other.symmetric) and self._differs(mu, L) for (mu, L), (_, other) in (forms, forms[::-1])
             )
+
+    def _differs(self, mu: float, L: Ball) -> bool:
+        """True if the degree of x -> min(x, L x) is proven not to be one, or L x >= 0 is complementary to some x."""
+        if self.push is not None:
+            pushed = Ball.exact(self.push[None]) @ L
+            return bool(np.all(self.push >= 0) and np.all(pushed.mid + pushed.rad < 0))
+        # at rest a complementary x would be no motion that grows
+        return self.load is not None and mu > 0 and _degree(L, self.load) not in (1, None)
+
+
+def _degree(L: Ball, load: Floats) -> int | None:
+    """The sum of the signs of det L over all nodes that slide in 0 <= x, r = load + L x >= 0; None if not proven."""
+    k, total = len(load), 0
+    if 2**k > MOST_WAYS:
+        return None
+    for slides in itertools.chain.from_iterable(itertools.combinations(range(k), size) for size in range(k + 1)):
+        answer, _ = _complementary(L, Ball.exact(load), slides)
+        if answer is None:
+            return None
+        if answer:
+            sign = determinant_sign(L[np.ix_(slides, slides)]) if slides else 1
+            if not sign:
+                return None
+            total += sign
+    return total
 
 
 def _slope(motions: Motions, node: Touching, code: int) -> Ball:

@@ -13,7 +13,7 @@ from enumsol.branches.space.make_curved import CurvedArcValues
 from enumsol.branches.space.pieces import curve_between
 from enumsol.search.space.curve_proposals import border_of_zeta, curve_around, curve_point, placed
 from enumsol.support.deadlines import look
-from enumsol.trusted.motions_of_body import unit_vector
+from enumsol.trusted.motions_of_body import direction
 from enumsol.trusted.space.curve_events import CurveMotion
 from enumsol.trusted.space.curve_parts import Place
 from enumsol.trusted.space.solution_curve import SLIP, SolutionCurve, lies_in, parameter_in
@@ -170,7 +170,8 @@ class SlipDirections:
             return None
         half = 0.5 * _LONGER * length
         curve = curve_around(self._given, 0.5 * (first + last), (last - first) / length, border, half, roomy=False)
-        if curve is None or not lies_in(whole.box, curve.at(Ball(np.array(0.0), np.array(half)))):
+        # boxes are convex
+        if curve is None or not (lies_in(whole.box, curve.at(-half)) and lies_in(whole.box, curve.at(half))):
             return None
         # its middle is on the arc, on which alpha rises from below the range to above it
         middle = curve.at(0.0)
@@ -197,7 +198,7 @@ class SlipDirections:
         """The direction of the tangential arguments of P at a node that slips: that of its friction."""
         t = self._given.tau[i]
         if len(t) == 2:
-            return unit_vector(z[t])
+            return direction(z[t])[0]
         axis = (int(t[0]) // self._given.p) - 1
         return Ball.exact(np.sign(z.mid[t[0]]) * np.eye(2)[axis])
 
