@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from functools import cached_property
-from itertools import islice
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -25,9 +24,11 @@ if TYPE_CHECKING:
     from enumsol.support.array_types import Floats
     from enumsol.trusted.space.solution_curve import AlphaProblem
 
-#: Boxes are longer by this than the ranges of alpha that they are for, and how many knots away from a vertex the ends of
-#: a box over it are at most: more hardly help, since boxes farther away hold more directions.
-_LONGER, _FARTHER = 1.05, 4
+#: Boxes are longer by this than the ranges of alpha that they are for.
+_LONGER = 1.05
+#: Shares of the ways to the knots on both sides of a vertex at which a box over it ends: where it is longer it holds more
+#: directions, and where it is too short rounding errors are as large.
+_SHARES = (0.0, 2.0**-32, 2.0**-24, 2.0**-16, 2.0**-8, 1.0)
 #: A part of an arc: the places at its ends, of which one may lie behind a vertex, and the curve that has both.
 _Part = tuple[Place, SolutionCurve, Place]
 
@@ -133,10 +134,13 @@ class SlipDirections:
         border = self._borders[min(max(k, 0), last - 1)]
         if 0 <= k < last:
             return self._between(self._knots[k], self._knots[k + 1], border)
-        # next to a vertex boxes may be too short to be proven
-        sides = zip(self._knots if k < 0 else self._knots[::-1], self._behind[k == last], strict=False)
-        pairs = ((behind, own) if k < 0 else (own, behind) for own, behind in islice(sides, _FARTHER))
-        return next((part for pair in pairs if (part := self._between(*pair, border, over=k)) is not None), None)
+        own, behind = self._knots[:2] if k < 0 else self._knots[:-3:-1], self._behind[k == last]
+        for share in _SHARES if len(behind) else ():
+            inner, outer = (side[0] + share * (side[1] - side[0]) for side in (own, behind))
+            part = self._between(*((outer, inner) if k < 0 else (inner, outer)), border, over=k)
+            if part is not None:
+                return part
+        return None
 
     def _between(self, first: Floats, other: Floats, border: Floats, *, over: int = 0) -> _Part | None:
         """The part between two points; ``over`` is other than 0 if one of them lies behind a vertex."""
