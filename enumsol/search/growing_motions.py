@@ -104,7 +104,9 @@ class GrowingMotions:
         below, above = (unit / 4, unit / STRIDE, unit / STRIDE**2, 0.0), [unit * STRIDE**k for k in range(1, 6)]
         for pushed, definite in ((below, above), (above, below)):
             end = next((mu for mu in definite if self._definite_at(mu)), None)
-            for mu in () if end is None else pushed:
+            if end is None:
+                continue
+            for mu in pushed:
                 K = self.stiffness.at(mu)
                 L = None if K is None else self.motions.slopes.mid.T @ K.mid @ self.motions.moves.mid
                 push = None if L is None else _push(L)
@@ -275,7 +277,7 @@ def _push(L: Floats) -> Floats | None:
 
 
 def _load(L: Floats) -> Floats | None:
-    """q with which the solutions of 0 <= x, q + L x >= 0 and their signs are known best, if these do not add up to 1."""
+    """q for which the signs of all solutions of 0 <= x, q + L x >= 0 are known best, if they do not add up to 1."""
     k = len(L)
     if not 0 < k <= _COUNTED or L.shape != (k, k):
         return None

@@ -98,9 +98,9 @@ class BodyMotions:
         self._node_part = together[first]
         self._stiffness: dict[Any, DynamicStiffness] = {}
         # F0 and F1 of F0 + alpha F1, by node and axis
-        first, slope = (np.asarray(part).reshape(problem.p, -1).tolist() for part in problem.affine_friction)
+        parts = (np.asarray(part).reshape(problem.p, -1).tolist() for part in problem.affine_friction)
         self._friction = [
-            [(Fraction(x), Fraction(y)) for x, y in zip(*pair, strict=True)] for pair in zip(first, slope, strict=True)
+            [(Fraction(x), Fraction(y)) for x, y in zip(*pair, strict=True)] for pair in zip(*parts, strict=True)
         ]
 
     def settings(
@@ -173,9 +173,7 @@ class BodyMotions:
         )
         return Setting(self._stiffness_of(part, dofs, rows), motions, dofs, rows, list(moves))
 
-    def _limit(
-        self, held: Collection[int], F: list[Ball], i: int, directions: Ball | None
-    ) -> tuple[list[Ball], Ball]:
+    def _limit(self, held: Collection[int], F: list[Ball], i: int, directions: Ball | None) -> tuple[list[Ball], Ball]:
         """Tangential move of a node at its limit, by axis, and by how much T_i sinks meanwhile (theory, (15.3))."""
         if len(F) == 1:
             sign = 1.0 if SLIP_PLUS in held else -1.0

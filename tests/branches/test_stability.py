@@ -121,7 +121,7 @@ def test_verdicts_that_do_not_fit_the_arcs_are_refused(square, tmp_path, change)
     else:
         first[0]["growth"] = [1, None]
     file.write_text(json.dumps(record))
-    with pytest.raises(enumsol.InvalidArgumentError, match="square.json"):
+    with pytest.raises(enumsol.InvalidArgumentError, match=r"square\.json"):
         enumsol.BranchGraph.load(file)
 
 

@@ -1,4 +1,4 @@
-"""Verdicts along arcs in 3D, where directions of slip turn: closed forms of one node, and the judge's at single alphas."""
+"""Verdicts along arcs in 3D, where directions of slip turn: closed forms of one node, and the judge's at alphas."""
 
 from collections import Counter
 
@@ -86,7 +86,7 @@ def test_directions_are_enclosed_over_any_range(turning):
 
 def test_a_node_whose_friction_grows_with_alpha():
     """It slides one way, and runs away from the alpha on at which F m_c'd = m."""
-    _, arc, spans = sliding_arc(one_node([0.4, 1, 0], [0, 0, 0], 0.5, 0.25), (0, 5))
+    _, _, spans = sliding_arc(one_node([0.4, 1, 0], [0, 0, 0], 0.5, 0.25), (0, 5))
     change = (MASS / MASSES[0] - 0.5) / 0.25
     assert [span.verdict for span in spans] == [QUIET, OPEN, AWAY]
     assert spans[1].low < change < spans[1].high < spans[1].low + 5 * 2.0**-9
@@ -175,4 +175,4 @@ def test_random_bodies():
 def test_many_random_bodies():
     counts = compared([(2, k) for k in range(60)])
     assert counts[OPEN] <= 0.02 * (counts[AWAY] + counts[QUIET]), counts
-    assert counts[AWAY] and counts[QUIET], counts
+    assert min(counts[AWAY], counts[QUIET]) > 0, counts

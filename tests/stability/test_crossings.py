@@ -96,10 +96,7 @@ def test_counted_ways_to_go_on_anywhere():
 def test_a_motion_that_no_weights_find():
     """L(0) has a column of positive entries, so that no weighted rows are negative; the ways to go on do not add up."""
     L = np.array([[0.56, -2.24], [0.20, -0.96]])
-    # rows and columns of both nodes, whose normals bring the coupling
-    R = np.vstack([np.zeros((2, 2)), np.eye(2)])
     F = np.array([1.0, 1.0])
-    T = R - np.vstack([np.diag(F), np.zeros((2, 2))])
     K = np.block([[9 * np.eye(2), np.zeros((2, 2))], [np.zeros((2, 2)), 4 * np.eye(2)]])
     K[:2, 2:] = K[2:, 2:] - L  # T'K R = K_tt - K_nt
     K[2:, :2] = K[:2, 2:].T

@@ -26,8 +26,8 @@ if TYPE_CHECKING:
 
 #: Boxes are longer by this than the ranges of alpha that they are for.
 _LONGER = 1.05
-#: Shares of the ways to the knots on both sides of a vertex at which a box over it ends: where it is longer it holds more
-#: directions, and where it is too short rounding errors are as large.
+#: Shares of the ways to the knots on both sides of a vertex at which a box over it ends: a longer one holds more
+#: directions, and one that is too short is not proven, since rounding errors are as large.
 _SHARES = (0.0, 2.0**-32, 2.0**-24, 2.0**-16, 2.0**-8, 1.0)
 #: A part of an arc: the places at its ends, of which one may lie behind a vertex, and the curve that has both.
 _Part = tuple[Place, SolutionCurve, Place]
@@ -79,8 +79,9 @@ class SlipDirections:
         x = placed(self._given, self._values.point(alpha))
         near = curve_point(self._given, x, self._borders[0])
         found = self._none()
-        for i in self._nodes if near is not None else ():
-            found[i] = self._direction(i, Ball.exact(near.z))
+        if near is not None:
+            for i in self._nodes:
+                found[i] = self._direction(i, Ball.exact(near.z))
         return found
 
     def over(self, low: float, high: float) -> Ball | None:
@@ -217,8 +218,8 @@ def _two(values: Floats) -> Floats:
 def _knots_behind(arc: Arc, vertex: int, arcs: Sequence[Arc]) -> Floats:
     """The points of the only other arc that ends at a vertex, the next one first, (N, m + 1); none if it is not one."""
     ends = [(other, way) for other in arcs for way, number in ((1, other.tail), (-1, other.head)) if number == vertex]
-    others = [(other._values, way) for other, way in ends if other is not arc]
-    if len(others) != 1 or not isinstance(others[0][0], CurvedArcValues):
+    others = [(other, way) for other, way in ends if other is not arc]
+    if len(others) != 1:
         return np.zeros((0, 0))
-    values, way = others[0]
-    return placed(values.given, values.knots)[::way]
+    values, way = others[0][0]._values, others[0][1]
+    return placed(values.given, values.knots)[::way] if isinstance(values, CurvedArcValues) else np.zeros((0, 0))
