@@ -45,8 +45,8 @@ class Setting:
         Its degrees of freedom.
     rows : list of int
         Those rows among all contact rows.
-    limits : list of int
-        Contact nodes at their limit, in the order of ``motions``.
+    limits, touching : lists of int
+        Contact nodes at their limit and those that touch without force, in the order of ``motions``.
     """
 
     stiffness: DynamicStiffness
@@ -54,6 +54,7 @@ class Setting:
     dofs: Integers
     rows: list[int]
     limits: list[int]
+    touching: list[int]
 
 
 class BodyMotions:
@@ -64,6 +65,8 @@ class BodyMotions:
     problem : ContactProblem or ContactProblem3D
     mass : (n, n) array_like or sparse, or None
         In place of ``problem.inertia``.
+    at_rest : bool
+        Only K(0) is asked for, which takes no mass.
 
     Attributes
     ----------
@@ -79,11 +82,16 @@ class BodyMotions:
         There is none, or friction depends on the solution.
     """
 
-    def __init__(self, problem: AnyProblem, mass: ArrayLike | sp.sparray | sp.spmatrix | None = None) -> None:
+    def __init__(
+        self, problem: AnyProblem, mass: ArrayLike | sp.sparray | sp.spmatrix | None = None, *, at_rest: bool = False
+    ) -> None:
         self.problem = problem
         if getattr(problem, "depends_on_solution", False):
             raise InvalidArgumentError("friction depends on the solution; expected constant coefficients")
-        self.mass = problem.inertia if mass is None else checked_mass(mass, problem.A, problem.modes.N)
+        if at_rest:
+            self.mass = sp.csc_array((problem.n, problem.n))
+        else:
+            self.mass = problem.inertia if mass is None else checked_mass(mass, problem.A, problem.modes.N)
         A, rows = sp.csc_array(problem.A), sp.csr_array(problem.contact_rows)
         self.tangents = rows.shape[0] // problem.p - 1
         links = sp.csr_array(abs(A) + abs(self.mass))
@@ -155,7 +163,8 @@ class BodyMotions:
             slopes.append(_column(len(rows), along | {place[i]: -sinking}))
         touching: list[Touching] = []
         signed = [True] * len(moves)
-        for i in (i for i, kind in kinds.items() if kind == "touching"):
+        unloaded = [i for i, kind in kinds.items() if kind == "touching"]
+        for i in unloaded:
             own = [(k + 1) * p + i for k in range(self.tangents) if (k + 1) * p + i in place]
             start = len(columns)
             columns.append(_column(len(rows), {place[i]: Ball.exact(np.array(-1.0))}))
@@ -171,7 +180,7 @@ class BodyMotions:
             tuple(touching),
             tuple(k for k, i in enumerate(moves) if i in unsure),
         )
-        return Setting(self._stiffness_of(part, dofs, rows), motions, dofs, rows, list(moves))
+        return Setting(self._stiffness_of(part, dofs, rows), motions, dofs, rows, list(moves), unloaded)
 
     def _limit(self, held: Collection[int], F: list[Ball], i: int, directions: Ball | None) -> tuple[list[Ball], Ball]:
         """Tangential move of a node at its limit, by axis, and by how much T_i sinks meanwhile (theory, (15.3))."""
@@ -179,20 +188,20 @@ class BodyMotions:
             sign = 1.0 if SLIP_PLUS in held else -1.0
             return [Ball.exact(np.array(sign))], F[0][i]
         assert directions is not None
-        first = next(k for k, f in enumerate(F) if f.mid[i] > 0)
+        larger = max(range(len(F)), key=lambda k: float(F[k].mid[i]))
         d, length = direction(directions[i])
-        return [d[k] * self._ratio(F, i, first, k) for k in range(len(F))], F[first][i] * length
+        return [d[k] * self._ratio(F, i, larger, k) for k in range(len(F))], F[larger][i] * length
 
-    def _ratio(self, F: list[Ball], i: int, first: int, k: int) -> Ball:
-        """The coefficient along one axis over that along another one; zero where there is no friction."""
-        if k == first:
+    def _ratio(self, F: list[Ball], i: int, larger: int, k: int) -> Ball:
+        """The larger coefficient over that along an axis; zero where there is no friction."""
+        if k == larger:
             return Ball.exact(np.array(1.0))
         if F[k].mid[i] == 0:
             # no force is along that axis
             return Ball.exact(np.array(0.0))
-        (above, rate), (below, other) = self._friction[i][first], self._friction[i][k]
+        (above, rate), (below, other) = self._friction[i][larger], self._friction[i][k]
         if above * other != below * rate:
-            return F[first][i] * _inverse(F[k][i])
+            return F[larger][i] * reciprocal(F[k][i])
         # for all alpha
         exact = above / below if below else rate / other
         value = float(exact)
@@ -243,11 +252,10 @@ def _kind(held: Collection[int], friction: bool) -> str:
 
 def friction_directions(forces: Floats, F: list[Ball]) -> Ball:
     """lambda_t / F by axis, (p, 2), from bounds of lambda_t, (p, 2, 2); zero along axes without friction."""
-    low, high = forces[..., 0], forces[..., 1]
-    found = Ball(0.5 * (low + high), 0.5 * (high - low) * SAFE + TINY)
+    found = hull([Ball.exact(forces[..., 0]), Ball.exact(forces[..., 1])])
     for k, f in enumerate(F):
         for i in range(len(found.mid)):
-            found[i, k] = found[i, k] * _inverse(f[i])
+            found[i, k] = found[i, k] * reciprocal(f[i])
     return found
 
 
@@ -264,7 +272,7 @@ def direction(v: Ball) -> tuple[Ball, Ball]:
     return Ball(np.array([x, y]), aside), Ball(np.array(1.0), np.array((1.0 / cosine - 1.0) * SAFE + 8 * UNIT))
 
 
-def _inverse(F: Ball) -> Ball:
+def reciprocal(F: Ball) -> Ball:
     """1 / F; of no friction at all zero, since no force is along that axis."""
     mid = float(F.mid)
     return (
