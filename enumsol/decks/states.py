@@ -1,0 +1,127 @@
+"""What acts on a deck at the end of each of its steps, by nodes and elements: the cards of steps put into effect.
+
+Displacements, loads and temperatures of a step stay in later ones (OP=MOD) unless a card of their kind begins anew
+(OP=NEW) or gives them again. Within a step concentrated forces on one node add up, as the programs have it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
+
+from enumsol.errors import InvalidArgumentError
+
+if TYPE_CHECKING:
+    from enumsol.decks.cards import Place
+    from enumsol.decks.steps import Act, Amplitude, Step
+
+#: What a value is given to: the card's kind, the number of a node or an element, and a component, a face or a label.
+Key = tuple[str, int | str, int | str]
+
+
+@dataclass
+class State:
+    """What is given at the end of a step.
+
+    Attributes
+    ----------
+    values : dict of Key to float
+        Displacements ("BOUNDARY", node, component), forces ("CLOAD", node, component), loads on elements ("DLOAD",
+        element, label), gravity ("GRAV", set, direction) and temperatures ("TEMPERATURE", node, 0).
+    places : dict of Key to Place
+        The line that gave each.
+    """
+
+    values: dict[Key, float] = field(default_factory=dict)
+    places: dict[Key, Place] = field(default_factory=dict)
+
+    def of(self, kind: str) -> dict[tuple[int | str, int | str], float]:
+        """The values of one kind, by node or element and what is given to it."""
+        return {(of, what): value for (own, of, what), value in self.values.items() if own == kind}
+
+
+def states_of(
+    initial: Step, steps: Iterable[Step], amplitudes: dict[str, Amplitude], keys: Callable[[Act], list[tuple[Key, float]]]
+) -> list[State]:
+    """The state at the end of every step; of a deck without steps that of its model.
+
+    ``keys`` are what an act gives values to, each with its reference value.
+
+    Raises
+    ------
+    InvalidArgumentError
+        A line contradicts another one of its step, or names an amplitude that does not exist.
+    """
+    acting = _Acting(amplitudes, keys)
+    acting.take(initial, 0.0)
+    states, time = [], 0.0
+    for step in steps:
+        time += step.period
+        acting.take(step, time)
+        states.append(acting.state())
+    return states or [acting.state()]
+
+
+class _Acting:
+    """Terms (reference value, amplitude) of every key, step by step."""
+
+    def __init__(
+        self, amplitudes: dict[str, Amplitude], keys: Callable[[Act], list[tuple[Key, float]]]
+    ) -> None:
+        self._amplitudes, self._keys = amplitudes, keys
+        self._terms: dict[Key, list[tuple[float, str | None]]] = {}
+        self._places: dict[Key, Place] = {}
+        self._period, self._time = 0.0, 0.0
+
+    def take(self, step: Step, time: float) -> None:
+        """Put the cards of a step into effect, which ends at this time."""
+        # what has ended keeps its last value, but for amplitudes over the time of all steps
+        for key, terms in self._terms.items():
+            self._terms[key] = [term if self._lasts(term[1]) else (self._value(term), None) for term in terms]
+        self._period, self._time = step.period, time
+        for kind in step.fresh:
+            kinds = (kind, "GRAV") if kind == "DLOAD" else (kind,)
+            for key in [key for key in self._terms if key[0] in kinds]:
+                del self._terms[key], self._places[key]
+        given: dict[Key, Place] = {}
+        for act in step.acts:
+            if act.amplitude is not None and act.amplitude not in self._amplitudes:
+                known = ", ".join(self._amplitudes) or "none"
+                raise InvalidArgumentError(
+                    f"{act.place}: *{act.card} names the amplitude {act.amplitude}; expected one of {known}"
+                )
+            for key, reference in self._keys(act):
+                self._give(key, (reference, act.amplitude), act, given)
+
+    def _give(self, key: Key, term: tuple[float, str | None], act: Act, given: dict[Key, Place]) -> None:
+        if key in given and key[0] == "CLOAD":
+            self._terms[key].append(term)
+            return
+        if key in given and key[0] in ("BOUNDARY", "DLOAD", "GRAV") and self._terms[key] != [term]:
+            raise InvalidArgumentError(
+                f"{act.place}: *{act.card} gives {_named(key)} the value {term[0]:g}, and {given[key]} gives it "
+                f"{self._terms[key][0][0]:g} in the same step; expected one value"
+            )
+        self._terms[key], self._places[key], given[key] = [term], act.place, act.place
+
+    def _lasts(self, amplitude: str | None) -> bool:
+        return amplitude is not None and self._amplitudes[amplitude].total
+
+    def _value(self, term: tuple[float, str | None]) -> float:
+        reference, name = term
+        if name is None:
+            return reference
+        amplitude = self._amplitudes[name]
+        return reference * amplitude.at(self._time if amplitude.total else self._period)
+
+    def state(self) -> State:
+        values = {key: sum(map(self._value, terms)) for key, terms in self._terms.items()}
+        return State(values, dict(self._places))
+
+
+def _named(key: Key) -> str:
+    kind, of, what = key
+    if kind in ("BOUNDARY", "CLOAD"):
+        return f"component {what} of node {of}"
+    return f"gravity of {of}" if kind == "GRAV" else f"{what} of element {of}"
