@@ -140,6 +140,9 @@ MESH_OPTIONS = {
     "pressure": Given(_LOAD, "NAME=P", _number),
     "pressure_slope": Given(_LOAD, "NAME=P", _number),
     "body_force": Given(_LOAD, "[NAME=]fx,fy[,fz]", _numbers),
+    "body_force_slope": Given(_LOAD, "[NAME=]fx,fy[,fz]", _numbers),
+    "force": Given(_LOAD, _PULL, _numbers),
+    "force_slope": Given(_LOAD, _PULL, _numbers),
 }
 
 
@@ -211,6 +214,9 @@ def solve(
     pressure : Force per area into the body.
     pressure_slope : The same, times alpha.
     body_force : Force per volume, such as the weight, by parts of the body.
+    body_force_slope : The same, times alpha.
+    force : Force on each node of a part or set of nodes, in 2D of the whole thickness.
+    force_slope : The same, times alpha.
     alpha : Parameter value: a number, or a fraction such as 8/3; required if friction or load depend on it.
     output : Write the problem for the other commands: .npz, .h5, or a new directory.
     dry_run : Print what was understood: bodies, parts, loads, contact nodes, rigid modes. Nothing is solved.

@@ -68,6 +68,9 @@ class Options:
     pressure: Mapping[str, float] | None
     pressure_slope: Mapping[str, float] | None
     body_force: ArrayLike | Mapping[str, ArrayLike] | None
+    body_force_slope: ArrayLike | Mapping[str, ArrayLike] | None
+    force: Vectors
+    force_slope: Vectors
     gap: float | Mapping[str, float]
     obstacle: Mapping[str, Sequence[float]] | None
     max_rigid_displacement: float | Literal["auto"] | None
@@ -365,6 +368,36 @@ def rigid_motions(places: Floats) -> Floats:
 
 
 # -- loads and springs -----------------------------------------------------------------------------------------------
+
+
+def nodal_forces(body: NodalBasis, mesh: PartedMesh, options: Options, slope: str = "") -> Floats:
+    """Forces on all nodes, (N, d), of everything that acts on parts; with ``slope`` "_slope" their derivatives."""
+    loads, pressures, volume, forces = (
+        getattr(options, name + slope) for name in ("load", "pressure", "body_force", "force")
+    )
+    total = part_forces(body, mesh, loads, pressures, slope)
+    if volume is not None:
+        total += body.volume_forces(body_force_of(mesh, volume, f"body_force{slope}"))
+    for part, value in by_part(forces, f"force{slope}").items():
+        total[mesh.nodes(part)] += short_vector(value, f"force{slope} of {part}", mesh.points.shape[1])
+    return total
+
+
+def body_force_of(mesh: PartedMesh, value: object, name: str) -> Floats:
+    """Force per volume of every cell, (M, d); parts of the body without one have none [force / length^3].
+
+    Raises
+    ------
+    InvalidArgumentError
+        It is not that, or a name does not exist.
+    """
+    dimension = mesh.points.shape[1]
+    if not isinstance(value, Mapping):
+        return np.tile(short_vector(value, name, dimension), (len(mesh.cells), 1))
+    density = np.zeros((len(mesh.cells), dimension))
+    for part, force in by_part(value, name).items():
+        density[mesh.body(part)] += short_vector(force, f"{name} of {part}", dimension)
+    return density
 
 
 def part_forces(body: NodalBasis, mesh: PartedMesh, loads: object, pressures: object, slope: str = "") -> Floats:

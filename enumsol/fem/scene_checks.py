@@ -299,6 +299,11 @@ def _loaded_contact(scene: Scene) -> list[str]:
             if any(tuple(sorted(row)) in corners for row in scene.mesh.part(part).tolist()):
                 what = "stiffens" if option == "spring" else "acts on"
                 notes.append(f"{option} of {part} {what} contact nodes, as {part} is in contact")
+    touching = scene.contacts.rows.nodes
+    for option in ("force", "force_slope"):
+        named = getattr(scene.options, option) or ()
+        on = [part for part in named if np.any(np.isin(scene.mesh.nodes(part), touching))]
+        notes += [f"{option} of {part} acts on contact nodes" for part in on]
     return notes
 
 

@@ -41,7 +41,10 @@ if TYPE_CHECKING:
 
 
 #: Options that say what a part of the boundary is for.
-_USES = ("contact", "clamp", "symmetry", "displacement", "spring", "load", "load_slope", "pressure", "pressure_slope")
+_USES = (
+    *("contact", "clamp", "symmetry", "displacement", "spring"),
+    *("load", "load_slope", "pressure", "pressure_slope", "force", "force_slope"),
+)
 
 
 @dataclass(frozen=True)
