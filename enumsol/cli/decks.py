@@ -7,7 +7,7 @@ from collections.abc import Callable
 from contextvars import ContextVar
 from dataclasses import dataclass
 from functools import lru_cache, wraps
-from inspect import Parameter, signature
+from inspect import Parameter
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -29,13 +29,17 @@ OPTIONS = [
         "ignore",
         Parameter.KEYWORD_ONLY,
         default=None,
-        annotation=Annotated[list[str] | None, typer.Option("--ignore", metavar="CARD", help=_IGNORE, rich_help_panel=_PANEL)],
+        annotation=Annotated[
+            list[str] | None, typer.Option("--ignore", metavar="CARD", help=_IGNORE, rich_help_panel=_PANEL)
+        ],
     ),
     Parameter(
         "deck_step",
         Parameter.KEYWORD_ONLY,
         default=None,
-        annotation=Annotated[int | None, typer.Option("--step", min=1, metavar="N", help=_STEP, rich_help_panel=_PANEL)],
+        annotation=Annotated[
+            int | None, typer.Option("--step", min=1, metavar="N", help=_STEP, rich_help_panel=_PANEL)
+        ],
     ),
 ]
 
@@ -51,9 +55,11 @@ class _Chosen:
 _CHOSEN = ContextVar("enumsol_deck", default=_Chosen())
 
 
-def with_decks(command: Callable[..., None], parameters: list[Parameter]) -> tuple[Callable[..., None], list[Parameter]]:
+def with_decks(
+    command: Callable[..., None], parameters: list[Parameter]
+) -> tuple[Callable[..., None], list[Parameter]]:
     """A command with a PROBLEM, and its parameters, with the options of decks; others as they are."""
-    if all(parameter.name != "problem" for parameter in parameters):
+    if not {"problem", "mesh"} & {parameter.name for parameter in parameters}:
         return command, parameters
 
     @wraps(command)

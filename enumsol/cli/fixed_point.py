@@ -10,7 +10,6 @@ from enumsol.cli import output
 from enumsol.cli.common import ExitStatus, alpha_of, finish, in_units, load_problem, so_far, units_of
 from enumsol.cli.options import Count, Number, OutputFile, Problem, Quiet, Units
 from enumsol.cli.progress import Display
-from enumsol.errors import InvalidArgumentError
 
 if TYPE_CHECKING:
     from enumsol.fixed_points import FixedPoint, FixedPointProgress

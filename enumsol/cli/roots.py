@@ -140,7 +140,9 @@ class Search:
 
 
 @options.with_options(*options.options_of(Search), after=2)
-def roots(problem: options.Problem, alpha: options.Number | None = None, *, quiet: options.Quiet = False, **chosen: Any) -> None:
+def roots(
+    problem: options.Problem, alpha: options.Number | None = None, *, quiet: options.Quiet = False, **chosen: Any
+) -> None:
     """Find all solutions of PROBLEM at one ALPHA.
 
     Prints a table of the roots and whether it is complete; lambda_n and lambda_t are nodal forces, not pressures. The

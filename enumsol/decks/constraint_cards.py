@@ -129,4 +129,3 @@ def transform(reading: Reading, given: Card) -> str:
     nodes = given.needed("NSET")
     reading.analysis.transforms.append(Transform(given.place, nodes, kind, numbers))
     return f"components of {nodes} are {'cylindrical' if kind == 'C' else 'along axes of their own'}"
-

@@ -75,8 +75,22 @@ def friction(reading: Reading, given: Card) -> str:
 
 
 @card(
-    "CONTACT PAIR", "INTERACTION", "ADJUST", "TYPE", "SMALL SLIDING", "TIED", "TRACKING", "NO THICKNESS", "HCRIT",
-    "EXTENSION ZONE", "SMOOTH", "SUPPLEMENTARY CONSTRAINTS", "MECHANICAL CONSTRAINT", "CPSET", "WEIGHT", "OP",
+    "CONTACT PAIR",
+    "INTERACTION",
+    "ADJUST",
+    "TYPE",
+    "SMALL SLIDING",
+    "TIED",
+    "TRACKING",
+    "NO THICKNESS",
+    "HCRIT",
+    "EXTENSION ZONE",
+    "SMOOTH",
+    "SUPPLEMENTARY CONSTRAINTS",
+    "MECHANICAL CONSTRAINT",
+    "CPSET",
+    "WEIGHT",
+    "OP",
 )
 def contact_pair(reading: Reading, given: Card) -> str:
     """*CONTACT PAIR: the first surface has the contact nodes, the second one the facets that they face."""
@@ -86,7 +100,9 @@ def contact_pair(reading: Reading, given: Card) -> str:
     name = given.name_of("INTERACTION")
     for row, entries in given.rows():
         slave, master = _two(given, row, entries)
-        reading.analysis.pairs.append(ContactPair(given.at(row), slave, master, name, distance, tied="TIED" in given.options))
+        reading.analysis.pairs.append(
+            ContactPair(given.at(row), slave, master, name, distance, tied="TIED" in given.options)
+        )
     said = ["nodes of the first surface against facets of the second, with small sliding"]
     if distance is not None:
         said.append(f"gaps up to {distance:g} are closed")

@@ -46,6 +46,11 @@ class Reading:
     material: Material | None = None
 
     @property
+    def analysis(self) -> Analysis:
+        """What cards of steps, contacts and constraints are put into."""
+        return self.deck.analysis
+
+    @property
     def region(self) -> Region:
         """What nodes, elements and sets are put into."""
         if self.part:

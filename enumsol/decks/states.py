@@ -6,18 +6,24 @@ Displacements, loads and temperatures of a step stay in later ones (OP=MOD) unle
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
+
+import numpy as np
 
 from enumsol.errors import InvalidArgumentError
 
 if TYPE_CHECKING:
     from enumsol.decks.cards import Place
-    from enumsol.decks.steps import Act, Amplitude, Step
+    from enumsol.decks.model import Deck
+    from enumsol.decks.steps import Act, Step
+    from enumsol.support.array_types import Integers
 
 #: What a value is given to: the card's kind, the number of a node or an element, and a component, a face or a label.
 Key = tuple[str, int | str, int | str]
+
+#: Length of a direction may differ from one by this, by rounding of its components in the deck.
+_ROUNDED = 1e-3
 
 
 @dataclass
@@ -41,35 +47,29 @@ class State:
         return {(of, what): value for (own, of, what), value in self.values.items() if own == kind}
 
 
-def states_of(
-    initial: Step, steps: Iterable[Step], amplitudes: dict[str, Amplitude], keys: Callable[[Act], list[tuple[Key, float]]]
-) -> list[State]:
-    """The state at the end of every step; of a deck without steps that of its model.
-
-    ``keys`` are what an act gives values to, each with its reference value.
+def states_of(deck: Deck) -> list[State]:
+    """The state at the end of every step.
 
     Raises
     ------
     InvalidArgumentError
-        A line contradicts another one of its step, or names an amplitude that does not exist.
+        A line contradicts another one of its step, or names what is not in the deck.
     """
-    acting = _Acting(amplitudes, keys)
-    acting.take(initial, 0.0)
-    states, time = [], 0.0
-    for step in steps:
+    acting, time = _Acting(deck), 0.0
+    acting.take(deck.analysis.initial, time)
+    states = []
+    for step in deck.analysis.steps:
         time += step.period
         acting.take(step, time)
         states.append(acting.state())
-    return states or [acting.state()]
+    return states
 
 
 class _Acting:
     """Terms (reference value, amplitude) of every key, step by step."""
 
-    def __init__(
-        self, amplitudes: dict[str, Amplitude], keys: Callable[[Act], list[tuple[Key, float]]]
-    ) -> None:
-        self._amplitudes, self._keys = amplitudes, keys
+    def __init__(self, deck: Deck) -> None:
+        self._deck, self._amplitudes = deck, deck.analysis.amplitudes
         self._terms: dict[Key, list[tuple[float, str | None]]] = {}
         self._places: dict[Key, Place] = {}
         self._period, self._time = 0.0, 0.0
@@ -91,7 +91,7 @@ class _Acting:
                 raise InvalidArgumentError(
                     f"{act.place}: *{act.card} names the amplitude {act.amplitude}; expected one of {known}"
                 )
-            for key, reference in self._keys(act):
+            for key, reference in _given_to(self._deck, act):
                 self._give(key, (reference, act.amplitude), act, given)
 
     def _give(self, key: Key, term: tuple[float, str | None], act: Act, given: dict[Key, Place]) -> None:
@@ -100,7 +100,7 @@ class _Acting:
             return
         if key in given and key[0] in ("BOUNDARY", "DLOAD", "GRAV") and self._terms[key] != [term]:
             raise InvalidArgumentError(
-                f"{act.place}: *{act.card} gives {_named(key)} the value {term[0]:g}, and {given[key]} gives it "
+                f"{act.place}: *{act.card} gives {self._named(key)} the value {term[0]:g}, and {given[key]} gives it "
                 f"{self._terms[key][0][0]:g} in the same step; expected one value"
             )
         self._terms[key], self._places[key], given[key] = [term], act.place, act.place
@@ -119,9 +119,49 @@ class _Acting:
         values = {key: sum(map(self._value, terms)) for key, terms in self._terms.items()}
         return State(values, dict(self._places))
 
+    def _named(self, key: Key) -> str:
+        kind, of, what = key
+        if kind in ("BOUNDARY", "CLOAD"):
+            return f"component {what} of node {self._deck.node_name(int(of))}"
+        return f"gravity of {of}" if kind == "GRAV" else f"{what} of element {self._deck.element_name(int(of))}"
 
-def _named(key: Key) -> str:
-    kind, of, what = key
-    if kind in ("BOUNDARY", "CLOAD"):
-        return f"component {what} of node {of}"
-    return f"gravity of {of}" if kind == "GRAV" else f"{what} of element {of}"
+
+def _given_to(deck: Deck, act: Act) -> list[tuple[Key, float]]:
+    """Keys that an act gives values to, with reference values."""
+    if act.card in ("BOUNDARY", "CLOAD"):
+        rows = deck.nodes_of(act.target, act.place).tolist()
+        return [((act.card, row, component), act.values[0]) for row in rows for component in act.components]
+    if act.card in ("TEMPERATURE", "INITIAL CONDITIONS"):
+        rows = deck.nodes_of(act.target, act.place).tolist()
+        return [((act.card, row, 0), act.values[0]) for row in rows]
+    if act.label == "GRAV":
+        length = float(np.linalg.norm(act.values[1:]))
+        if abs(length - 1.0) > _ROUNDED:
+            raise InvalidArgumentError(
+                f"{act.place}: *DLOAD has GRAV with a direction of length {length:g}, which programs read differently; "
+                "expected length one"
+            )
+        return [(("GRAV", act.target, " ".join(map(repr, act.values[1:]))), act.values[0])]
+    if act.card == "DSLOAD":
+        if act.target not in deck.surfaces or deck.surfaces[act.target].nodes is not None:
+            raise InvalidArgumentError(f"{act.place}: there is no surface of faces {act.target}; expected *SURFACE")
+        faces = deck.surfaces[act.target].faces.tolist()
+        return [(("DLOAD", element, f"P{face + 1}"), act.values[0]) for element, face in faces]
+    rows = deck.elements_of(act.target, act.place)
+    if act.label[:1] == "P":
+        _check_face(deck, rows, act)
+    return [(("DLOAD", row, act.label), act.values[0]) for row in rows.tolist()]
+
+
+def _check_face(deck: Deck, rows: Integers, act: Act) -> None:
+    """Refuse loads on faces that elements do not have."""
+    first = 0
+    for block in deck.blocks:
+        own = rows[(rows >= first) & (rows < first + len(block.labels))]
+        first += len(block.labels)
+        faces = len(block.type.shape.faces)
+        if len(own) and not 1 <= int(act.label[1:]) <= faces:
+            raise InvalidArgumentError(
+                f"{act.place}: *DLOAD loads {act.label} of element {deck.element_name(int(own[0]))} of type "
+                f"{block.type.name}, which has {faces} faces; expected one of these"
+            )

@@ -43,21 +43,33 @@ def step(reading: Reading, given: Card) -> str:
     large = "NLGEOM" in given.options and given.name_of("NLGEOM") != "NO"
     if large and "NLGEOM" not in reading.ignore:
         raise given.refused("has NLGEOM, large displacements; expected small ones, or NLGEOM among what is ignored")
-    reading.analysis.steps.append(Step(given.place, given.options.get("NAME", "") or f"step {len(reading.analysis.steps) + 1}"))
+    reading.analysis.steps.append(
+        Step(given.place, given.options.get("NAME", "") or f"step {len(reading.analysis.steps) + 1}")
+    )
     return f"step {len(reading.analysis.steps)}" + ("; NLGEOM is ignored: displacements are small" if large else "")
 
 
 @card("END STEP")
-def end_step(reading: Reading, given: Card) -> str:
+def end_step(reading: Reading, given: Card) -> None:
     """*END STEP: what the step lacks is refused."""
     own = _step(reading, given)
     if not own.analysis:
         raise given.refused(f"ends step {len(reading.analysis.steps)}, which has no *STATIC; expected a static step")
     own.ended = True
-    return f"the end of step {len(reading.analysis.steps)}"
 
 
-@card("STATIC", "SOLVER", "DIRECT", "EXPLICIT", "TIME RESET", "TOTAL TIME AT START", "STABILIZE", "FACTOR", "ALLSDTOL", "CONTINUE")
+@card(
+    "STATIC",
+    "SOLVER",
+    "DIRECT",
+    "EXPLICIT",
+    "TIME RESET",
+    "TOTAL TIME AT START",
+    "STABILIZE",
+    "FACTOR",
+    "ALLSDTOL",
+    "CONTINUE",
+)
 def static(reading: Reading, given: Card) -> str:
     """*STATIC: its time counts for amplitudes."""
     own = _step(reading, given)
@@ -99,7 +111,7 @@ def _components(given: Card, row: int, entries: list[str]) -> tuple[int, ...]:
 @card("CLOAD", "OP", "AMPLITUDE", "FOLLOWER", *_OTHER)
 def cload(reading: Reading, given: Card) -> str:
     """*CLOAD: forces on nodes, and moments on reference nodes."""
-    _without_following(card)
+    _without_following(given)
     acts = []
     for row, entries in given.rows():
         component = _components(given, row, entries[1:2])
@@ -111,7 +123,7 @@ def cload(reading: Reading, given: Card) -> str:
 @card("DSLOAD", "OP", "AMPLITUDE", "FOLLOWER", "CONSTANT RESULTANT", *_OTHER)
 def dload(reading: Reading, given: Card) -> str:
     """*DLOAD and *DSLOAD: pressures on faces of elements or on surfaces, forces per volume and gravity."""
-    _without_following(card)
+    _without_following(given)
     acts = []
     for row, entries in given.rows():
         label = key(entries[1]) if len(entries) > 1 else ""
@@ -143,7 +155,9 @@ def initial_conditions(reading: Reading, given: Card) -> str:
         raise given.refused(f"has TYPE={kind}; expected TEMPERATURE")
     if reading.analysis.steps:
         raise given.refused("stands behind a *STEP; expected it before the first one")
-    reading.analysis.initial.acts += [_act(given, row, entries, "", (), (_last(given, row, entries, 1),)) for row, entries in given.rows()]
+    reading.analysis.initial.acts += [
+        _act(given, row, entries, "", (), (_last(given, row, entries, 1),)) for row, entries in given.rows()
+    ]
     return "temperatures at which nothing is strained"
 
 
@@ -170,7 +184,9 @@ def change_friction(reading: Reading, given: Card) -> str:
     name = given.needed("INTERACTION")
     own = _step(reading, given)
     if name not in reading.analysis.interactions:
-        raise given.refused(f"names the interaction {name}; expected one of {', '.join(reading.analysis.interactions) or 'none'}")
+        raise given.refused(
+            f"names the interaction {name}; expected one of {', '.join(reading.analysis.interactions) or 'none'}"
+        )
     own.friction[name] = reading.analysis.interactions[name].friction
     reading.analysis.changing = name
     return f"friction of {name} changes in step {len(reading.analysis.steps)}"

@@ -17,15 +17,14 @@ from enumsol.fem.deck_meshes import mesh_of_deck
 if TYPE_CHECKING:
     from enumsol.decks.cards import Place
     from enumsol.decks.model import Deck, Section
-    from enumsol.decks.states import Key, State
-    from enumsol.decks.steps import Act, ContactPair
+    from enumsol.decks.states import State
+    from enumsol.decks.steps import ContactPair
     from enumsol.fem.meshes import PartedMesh
     from enumsol.support.array_types import Floats, Integers
 
 #: Families of plane elements, and what `mesh_problem` calls them.
 _PLANES = {"plane strain": "strain", "plane stress": "stress", "axisymmetric": "axisymmetric"}
-#: Length of a direction may differ from one by this, by rounding of its components in the deck.
-_ROUNDED = 1e-3
+
 
 
 class DeckParts:
@@ -47,7 +46,11 @@ class DeckParts:
     def faces(self, faces: Integers, wanted: str, place: Place) -> str:
         """Name of a surface of faces (k, 2)."""
         return self._named(
-            self._deck.surfaces, np.unique(faces, axis=0), wanted, lambda own: Surface(place, own), lambda own: own.faces
+            self._deck.surfaces,
+            np.unique(faces, axis=0),
+            wanted,
+            lambda own: Surface(place, own),
+            lambda own: own.faces,
         )
 
     def _named(self, sets: Any, rows: Integers, wanted: str, made: Any, of: Any = lambda own: own) -> str:
@@ -73,37 +76,6 @@ class DeckParts:
     def mesh(self) -> PartedMesh:
         """Mesh of the deck with all of these."""
         return mesh_of_deck(self._deck)
-
-
-def given_to(deck: Deck, act: Act) -> list[tuple[Key, float]]:
-    """Keys that an act gives values to, with reference values.
-
-    Raises
-    ------
-    InvalidArgumentError
-        It names what is not in the deck.
-    """
-    if act.card in ("BOUNDARY", "CLOAD"):
-        rows = deck.nodes_of(act.target, act.place).tolist()
-        return [((act.card, row, component), act.values[0]) for row in rows for component in act.components]
-    if act.card in ("TEMPERATURE", "INITIAL CONDITIONS"):
-        rows = deck.nodes_of(act.target, act.place).tolist()
-        return [((act.card, row, 0), act.values[0]) for row in rows]
-    if act.label == "GRAV":
-        length = float(np.linalg.norm(act.values[1:]))
-        if abs(length - 1.0) > _ROUNDED:
-            raise InvalidArgumentError(
-                f"{act.place}: *DLOAD has GRAV with a direction of length {length:g}, which programs read differently; "
-                "expected length one"
-            )
-        return [(("GRAV", act.target, " ".join(map(repr, act.values[1:]))), act.values[0])]
-    if act.card == "DSLOAD":
-        if act.target not in deck.surfaces or deck.surfaces[act.target].nodes is not None:
-            raise InvalidArgumentError(f"{act.place}: there is no surface of faces {act.target}; expected *SURFACE")
-        faces = deck.surfaces[act.target].faces.tolist()
-        return [(("DLOAD", element, f"P{face + 1}"), act.values[0]) for element, face in faces]
-    rows = deck.elements_of(act.target, act.place).tolist()
-    return [(("DLOAD", row, act.label), act.values[0]) for row in rows]
 
 
 # -- the same in all steps -------------------------------------------------------------------------------------------
@@ -156,7 +128,9 @@ def _sections(deck: Deck) -> list[tuple[Section, Integers]]:
         if not len(rows):
             continue
         if section.kind != "SOLID SECTION":
-            raise InvalidArgumentError(f"{section.place}: *{section.kind} is of solid elements; expected *SOLID SECTION")
+            raise InvalidArgumentError(
+                f"{section.place}: *{section.kind} is of solid elements; expected *SOLID SECTION"
+            )
         if section.material not in deck.materials:
             known = ", ".join(deck.materials) or "none"
             raise InvalidArgumentError(
@@ -308,7 +282,11 @@ def _on_nodes(deck: Deck, parts: DeckParts, state: State, kind: str, free: float
 
 def _wanted(deck: Deck, rows: Integers, otherwise: str) -> str:
     """Name of a set of nodes that has just these, or another one."""
-    same = (name for name, own in deck.node_sets.items() if len(own) == len(rows) and np.array_equal(np.sort(own), np.sort(rows)))
+    same = (
+        name
+        for name, own in deck.node_sets.items()
+        if len(own) == len(rows) and np.array_equal(np.sort(own), np.sort(rows))
+    )
     return next(same, otherwise)
 
 

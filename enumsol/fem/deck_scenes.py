@@ -16,7 +16,7 @@ import numpy as np
 from enumsol.decks.reading import described
 from enumsol.decks.states import states_of
 from enumsol.errors import InvalidArgumentError, InvalidProblemError
-from enumsol.fem.deck_options import DeckParts, acting, friction, given_to, shared
+from enumsol.fem.deck_options import DeckParts, acting, friction, shared
 from enumsol.fem.mesh_problems import mesh_scene
 from enumsol.loading.steps import LoadStep
 from enumsol.support.arguments import file_path, positive_integer
@@ -96,10 +96,15 @@ class DeckModel:
         ]
 
     def _states(self) -> list[State]:
-        deck, said = self.deck, self.deck.analysis
-        if said.steps and not said.steps[-1].ended:
-            raise InvalidArgumentError(f"{said.steps[-1].place}: *STEP has no *END STEP; expected it")
-        return states_of(said.initial, said.steps, said.amplitudes, lambda act: given_to(deck, act))
+        steps = self.deck.analysis.steps
+        if not steps:
+            raise InvalidArgumentError(
+                f"{self.deck.path} has no *STEP; expected a deck with a step, or a bare mesh for enumsol solve, or "
+                "mesh_problem, with what acts on it as options"
+            )
+        if not steps[-1].ended:
+            raise InvalidArgumentError(f"{steps[-1].place}: *STEP has no *END STEP; expected it")
+        return states_of(self.deck)
 
     @property
     def step_count(self) -> int:
@@ -170,7 +175,7 @@ class DeckModel:
         return found
 
     def _number(self, step: int | None) -> int:
-        count = max(self.step_count, 1)
+        count = self.step_count
         if step is None:
             if count > 1:
                 raise InvalidArgumentError(
@@ -195,9 +200,7 @@ def account_of(deck: Deck) -> str:
     rows: dict[tuple[str, str, str], list[int]] = {}
     for entry in deck.account:
         rows.setdefault((entry.place.file, entry.card, entry.became), []).append(entry.place.line)
-    table = [
-        (f"{file} {_lines(lines)}", f"*{card}", became) for (file, card, became), lines in rows.items()
-    ]
+    table = [(f"{file} {_lines(lines)}", f"*{card}", became) for (file, card, became), lines in rows.items()]
     widths = [max((len(row[k]) for row in table), default=0) for k in (0, 1)]
     return "\n".join(f"{place:{widths[0]}}  {card:{widths[1]}}  {became}" for place, card, became in table)
 
