@@ -35,7 +35,7 @@ _OF_NUMBERS = frozenset("0123456789+-.eE, \t")
 
 
 @dataclass(frozen=True, order=True)
-class Place:
+class DeckPlace:
     """A line of a deck, as in "model.inp line 812"."""
 
     file: str
@@ -55,23 +55,23 @@ class Card:
         In upper case with single blanks, as in "SOLID SECTION".
     options : dict
         What stands behind the name: names in upper case, values as written; "" for an option without a value.
-    place : Place
+    place : DeckPlace
     data : list of str
         Lines of data without comments and empty lines, and without blanks at their ends.
-    runs : list of (int, Place)
+    runs : list of (int, DeckPlace)
         Places of the rows of data behind which others follow line by line.
     """
 
     name: str
     options: dict[str, str]
-    place: Place
+    place: DeckPlace
     data: list[str] = field(default_factory=list)
-    runs: list[tuple[int, Place]] = field(default_factory=list)
+    runs: list[tuple[int, DeckPlace]] = field(default_factory=list)
 
-    def at(self, row: int) -> Place:
-        """Place of a row of the data."""
+    def at(self, row: int) -> DeckPlace:
+        """DeckPlace of a row of the data."""
         first, place = self.runs[bisect_right(self.runs, row, key=lambda run: run[0]) - 1]
-        return Place(place.file, place.line + row - first)
+        return DeckPlace(place.file, place.line + row - first)
 
     def refused(self, found: str, row: int | None = None) -> InvalidArgumentError:
         """Error about the card, or about a row of its data: its place, its name and what is wrong with it."""
@@ -259,10 +259,10 @@ class _Source:
             begin = k + 1
             if not text.startswith("**"):
                 text, begin = _whole(lines, text, begin)
-                self._begin(Place(path.name, k + 1), path, text, above)
+                self._begin(DeckPlace(path.name, k + 1), path, text, above)
             self._add_data(path, lines, begin, following)
 
-    def _begin(self, place: Place, path: Path, text: str, above: tuple[Path, ...]) -> None:
+    def _begin(self, place: DeckPlace, path: Path, text: str, above: tuple[Path, ...]) -> None:
         word, *pairs = text[1:].split(",")
         options = {}
         for pair in pairs:
@@ -302,14 +302,15 @@ class _Source:
         if not filled:
             return
         if not self.cards:
+            place = DeckPlace(path.name, begin + filled[0] + 1)
             raise InvalidArgumentError(
-                f"{Place(path.name, begin + filled[0] + 1)}: {shown(stripped[filled[0]])} is no keyword; expected a "
+                f"{place}: {shown(stripped[filled[0]])} is no keyword; expected a "
                 "deck of CalculiX or Abaqus, which begins with one, such as *NODE"
             )
         card, last = self.cards[-1], -2
         for count, k in enumerate(filled):
             if k != last + 1:
-                card.runs.append((len(card.data) + count, Place(path.name, begin + k + 1)))
+                card.runs.append((len(card.data) + count, DeckPlace(path.name, begin + k + 1)))
             last = k
         card.data += [stripped[k] for k in filled]
 

@@ -89,7 +89,7 @@ def _constants(given: Card, count: int) -> Floats:
     return np.array(tables[0])
 
 
-@card("SOLID SECTION", "ELSET", "MATERIAL", "ORIENTATION", "CONTROLS")
+@card("SOLID SECTION", "ELSET", "MATERIAL", "ORIENTATION", "CONTROLS", of_mesh=True)
 def solid_section(reading: Reading, given: Card) -> str:
     """*SOLID SECTION: the material of a set of elements, and the thickness of plane ones."""
     elements, of = given.needed("ELSET"), given.needed("MATERIAL")
@@ -102,10 +102,10 @@ def solid_section(reading: Reading, given: Card) -> str:
     return f"elements of {elements} are of {of}" + (f", {value:g} thick" if value is not None else "")
 
 
-@card("SHELL SECTION", "ELSET", "MATERIAL", "ORIENTATION", "OFFSET", "NODAL THICKNESS", "COMPOSITE")
-@card("MEMBRANE SECTION", "ELSET", "MATERIAL", "ORIENTATION", "OFFSET", "NODAL THICKNESS")
-@card("BEAM SECTION", "ELSET", "MATERIAL", "SECTION", "ORIENTATION", "OFFSET1", "OFFSET2")
-@card("SURFACE SECTION", "ELSET", "DENSITY")
+@card("SHELL SECTION", "ELSET", "MATERIAL", "ORIENTATION", "OFFSET", "NODAL THICKNESS", "COMPOSITE", of_mesh=True)
+@card("MEMBRANE SECTION", "ELSET", "MATERIAL", "ORIENTATION", "OFFSET", "NODAL THICKNESS", of_mesh=True)
+@card("BEAM SECTION", "ELSET", "MATERIAL", "SECTION", "ORIENTATION", "OFFSET1", "OFFSET2", of_mesh=True)
+@card("SURFACE SECTION", "ELSET", "DENSITY", of_mesh=True)
 def other_section(reading: Reading, given: Card) -> str:
     """Sections of shells and the like, whose elements carry something."""
     elements = given.needed("ELSET")
@@ -113,7 +113,7 @@ def other_section(reading: Reading, given: Card) -> str:
     return f"section of {elements}"
 
 
-@card("ORIENTATION", "NAME", "SYSTEM")
+@card("ORIENTATION", "NAME", "SYSTEM", of_mesh=True)
 def orientation(reading: Reading, given: Card) -> str:
     """*ORIENTATION: local directions, by two points and an origin."""
     name = given.needed("NAME")

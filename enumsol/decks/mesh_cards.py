@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from functools import partial
+
 import numpy as np
 
 from enumsol.decks.cards import Card, is_number
 from enumsol.decks.elements import element_type
-from enumsol.decks.model import ElementBlock, Members, Region
+from enumsol.decks.model import DeckRegion, ElementBlock, Members
 from enumsol.decks.registry import Reading, card, harmless
 from enumsol.support.messages import counted
 
@@ -15,6 +17,7 @@ harmless("it asks for output", *(
     "CONTACT FILE", "CONTACT PRINT", "CONTACT OUTPUT", "FILE FORMAT", "MONITOR", "SECTION PRINT", "ENERGY FILE",
     "ENERGY PRINT", "ENERGY OUTPUT", "PRINT", "FILE OUTPUT", "INTEGRATED OUTPUT", "DIAGNOSTICS", "FACE PRINT",
 ))  # fmt: skip
+mesh_card = partial(card, of_mesh=True)
 #: Cards that make or move nodes or elements.
 _MAKERS = ("NGEN", "NFILL", "NCOPY", "NMAP", "ELGEN", "ELCOPY", "SYSTEM")
 
@@ -24,23 +27,25 @@ def _refused_maker(reading: Reading, given: Card) -> str | None:
 
 
 for _name in _MAKERS:
-    card(_name, *("NSET", "LINE", "NEW SET", "OLD SET", "CHANGE NUMBER", "ELSET", "SHIFT"))(_refused_maker)
+    mesh_card(_name, *("NSET", "LINE", "NEW SET", "OLD SET", "CHANGE NUMBER", "ELSET", "SHIFT"))(_refused_maker)
 
 
-@card("HEADING", "UNSYMMETRIC AXISYMMETRIC", "SPARSE")
+@mesh_card("HEADING", "UNSYMMETRIC AXISYMMETRIC", "SPARSE")
 def heading(reading: Reading, given: Card) -> str | None:
     """*HEADING: a title."""
     reading.deck.heading = reading.deck.heading or " ".join(given.data)
     return None
 
 
-@card("NODE", "NSET")
+@mesh_card("NODE", "NSET")
 def node(reading: Reading, given: Card) -> str:
     """*NODE: numbers and positions."""
     values = given.table(7)  # Abaqus: a direction behind the position
     labels = values[:, 0].astype(np.int64)
     if len(wrong := np.flatnonzero((labels != values[:, 0]) | (labels < 1) | (labels >= 2**53))):
-        raise given.refused("has a line that begins with no number of a node; expected 1, 2, ...", int(wrong[0]))
+        raise given.refused(
+            "has a line that begins with no number of a node; expected an integer from 1", int(wrong[0])
+        )
     region = reading.region
     region.nodes.append((given.place, labels, values[:, 1:4]))
     if name := given.options.get("NSET"):
@@ -48,14 +53,15 @@ def node(reading: Reading, given: Card) -> str:
     return counted(len(labels), "node")
 
 
-@card("ELEMENT", "TYPE", "ELSET")
-def element(reading: Reading, given: Card) -> str:
+@mesh_card("ELEMENT", "TYPE", "ELSET")
+def element(reading: Reading, given: Card) -> str | None:
     """*ELEMENT: numbers and nodes, by types."""
     name = given.needed("TYPE")
+    if name in reading.ignore:
+        reading.account(given, f"elements of type {name}, not used, as you say", used=False)
+        return None
     kind = element_type(name)
     if kind is None:
-        if name in reading.ignore:
-            return f"elements of type {name}, not used, as you say"
         raise given.refused(
             f"has elements of type {name}, which are not known; expected solid ones (C3D8, C3D10 and the like) or "
             f"plane ones (CPS4, CPE8, CAX6 and the like), or --ignore {name} to do without them"
@@ -69,7 +75,7 @@ def element(reading: Reading, given: Card) -> str:
     return f"{counted(len(values), 'element')} of type {name}"
 
 
-@card("NSET", "NSET", "GENERATE", "INSTANCE", "INTERNAL", "UNSORTED", "ELSET")
+@mesh_card("NSET", "NSET", "GENERATE", "INSTANCE", "INTERNAL", "UNSORTED", "ELSET")
 def nset(reading: Reading, given: Card) -> str:
     """*NSET: a set of nodes, or more nodes for one that exists."""
     members = _set(reading, given, "NSET")
@@ -78,7 +84,7 @@ def nset(reading: Reading, given: Card) -> str:
     return f"set of nodes {members.spelled}"
 
 
-@card("ELSET", "ELSET", "GENERATE", "INSTANCE", "INTERNAL", "UNSORTED")
+@mesh_card("ELSET", "ELSET", "GENERATE", "INSTANCE", "INTERNAL", "UNSORTED")
 def elset(reading: Reading, given: Card) -> str:
     """*ELSET: a set of elements, or more elements for one that exists."""
     return f"set of elements {_set(reading, given, 'ELSET').spelled}"
@@ -110,7 +116,7 @@ def _set(reading: Reading, given: Card, kind: str) -> Members:
     return members
 
 
-@card("SURFACE", "NAME", "TYPE", "INTERNAL")
+@mesh_card("SURFACE", "NAME", "TYPE", "INTERNAL")
 def surface(reading: Reading, given: Card) -> str:
     """*SURFACE: faces of elements, or nodes."""
     given.needed("NAME")
@@ -127,33 +133,33 @@ def surface(reading: Reading, given: Card) -> str:
     return f"surface of {'nodes' if members.nodal else 'faces'} {members.spelled}"
 
 
-@card("PART", "NAME")
+@mesh_card("PART", "NAME")
 def part(reading: Reading, given: Card) -> str:
     """*PART: what follows belongs to the part."""
     reading.part = given.needed("NAME")
     if reading.part in reading.parts:
         raise given.refused(f"is named {reading.part} like another one; expected names that differ")
-    reading.parts[reading.part] = Region(given.place)
+    reading.parts[reading.part] = DeckRegion(given.place)
     return f"part {reading.part}"
 
 
-@card("END PART")
+@mesh_card("END PART")
 def end_part(reading: Reading, given: Card) -> None:
     """*END PART."""
     reading.part = ""
 
 
-@card("ASSEMBLY", "NAME")
+@mesh_card("ASSEMBLY", "NAME")
 def assembly(reading: Reading, given: Card) -> None:
     """*ASSEMBLY: what follows belongs to the deck itself."""
 
 
-@card("END ASSEMBLY")
+@mesh_card("END ASSEMBLY")
 def end_assembly(reading: Reading, given: Card) -> None:
     """*END ASSEMBLY."""
 
 
-@card("INSTANCE", "NAME", "PART")
+@mesh_card("INSTANCE", "NAME", "PART")
 def instance(reading: Reading, given: Card) -> str:
     """*INSTANCE: a part that is moved, first by a vector and then about an axis."""
     name, of = given.needed("NAME"), given.needed("PART")
@@ -177,7 +183,7 @@ def instance(reading: Reading, given: Card) -> str:
     return f"instance {name} of part {of}"
 
 
-@card("END INSTANCE")
+@mesh_card("END INSTANCE")
 def end_instance(reading: Reading, given: Card) -> None:
     """*END INSTANCE."""
     reading.instance = ""

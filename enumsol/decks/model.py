@@ -1,6 +1,6 @@
 """A deck as a plain description: arrays and small records, which know nothing of contact problems.
 
-While it is read, nodes, elements, sets and surfaces belong to a `Region`: the deck itself, a part, or an instance of a
+While it is read, nodes, elements, sets and surfaces belong to a `DeckRegion`: the deck itself, a part, or an instance of a
 part. `enumsol.decks.assembly` puts them together to what `Deck` holds in the end: one list of nodes and one of elements
 for everything, and sets and surfaces by the rows in these.
 """
@@ -12,7 +12,7 @@ from pathlib import Path
 
 import numpy as np
 
-from enumsol.decks.cards import Place, is_number, key
+from enumsol.decks.cards import DeckPlace, is_number, key
 from enumsol.decks.elements import ElementType
 from enumsol.decks.steps import Analysis
 from enumsol.errors import InvalidArgumentError
@@ -22,11 +22,11 @@ from enumsol.support.messages import listed
 
 @dataclass(frozen=True)
 class Account:
-    """What became of a card.
+    """An entry of the account: a card, and what became of it.
 
     Attributes
     ----------
-    place : Place
+    place : DeckPlace
     card : str
         Its name.
     became : str
@@ -35,7 +35,7 @@ class Account:
         Whether it is part of the description.
     """
 
-    place: Place
+    place: DeckPlace
     card: str
     became: str
     used: bool = True
@@ -52,22 +52,22 @@ class ElementBlock:
         Numbers of the elements in the deck.
     nodes : (m, k) int array
         Their nodes in the deck's order: numbers while a region is read, rows of ``Deck.points`` in a deck.
-    place : Place
+    place : DeckPlace
     """
 
     type: ElementType
     labels: Integers
     nodes: Integers
-    place: Place
+    place: DeckPlace
 
 
 @dataclass(eq=False)
 class Members:
-    """What a set or a surface is made of, while a region is read.
+    """A set or a surface while a region is read: what it is made of.
 
     Attributes
     ----------
-    place : Place
+    place : DeckPlace
         Where it begins.
     spelled : str
         Its name as it is written there.
@@ -78,9 +78,9 @@ class Members:
         Whether it is a surface of nodes.
     """
 
-    place: Place
+    place: DeckPlace
     spelled: str
-    parts: list[tuple[str, Integers | range | str, str, Place]] = field(default_factory=list)
+    parts: list[tuple[str, Integers | range | str, str, DeckPlace]] = field(default_factory=list)
     nodal: bool = False
 
 
@@ -98,7 +98,7 @@ class Section:
         Of plane elements; None if the deck gives none.
     orientation : str
         Key of the orientation, or "".
-    place : Place
+    place : DeckPlace
     """
 
     kind: str
@@ -106,7 +106,7 @@ class Section:
     material: str
     thickness: float | None
     orientation: str
-    place: Place
+    place: DeckPlace
 
 
 @dataclass(frozen=True, eq=False)
@@ -122,14 +122,14 @@ class Orientation:
     origin : (3,) array
     rotation : (int, float) or None
         A local axis, 1 to 3, and degrees of an additional rotation about it.
-    place : Place
+    place : DeckPlace
     """
 
     system: str
     points: Floats
     origin: Floats
     rotation: tuple[int, float] | None
-    place: Place
+    place: DeckPlace
 
 
 @dataclass(eq=False)
@@ -139,7 +139,7 @@ class Material:
     Attributes
     ----------
     name : str
-    place : Place
+    place : DeckPlace
     elastic : str
         "ISO", "ORTHO" (nine moduli D1111, D1122, D2222, D1133, D2233, D3333, D1212, D1313, D2323) or
         "ENGINEERING CONSTANTS" (E1, E2, E3, nu12, nu13, nu23, G12, G13, G23); "" if it has none.
@@ -150,28 +150,28 @@ class Material:
         Coefficients of thermal expansion: one, or three along the local directions.
     zero : float
         Temperature from which expansion is measured.
-    elastic_place, expansion_place : Place or None
+    elastic_place, expansion_place : DeckPlace or None
     """
 
     name: str
-    place: Place
+    place: DeckPlace
     elastic: str = ""
     constants: Floats = field(default_factory=lambda: np.zeros(0))
     density: float | None = None
     expansion: Floats | None = None
     zero: float = 0.0
-    elastic_place: Place | None = None
-    expansion_place: Place | None = None
+    elastic_place: DeckPlace | None = None
+    expansion_place: DeckPlace | None = None
 
 
 @dataclass(eq=False)
-class Region:
+class DeckRegion:
     """Nodes, elements, sets and surfaces with numbers and names of their own: of the deck itself, or of a part.
 
     Attributes
     ----------
-    place : Place or None
-    nodes : list of (Place, labels, points)
+    place : DeckPlace or None
+    nodes : list of (DeckPlace, labels, points)
     blocks : list of ElementBlock
     sets : dict of ("NSET", "ELSET" or "SURFACE", key) to Members
     sections : list of Section
@@ -181,8 +181,8 @@ class Region:
         Two points on an axis, and degrees about it, for after the translation.
     """
 
-    place: Place | None = None
-    nodes: list[tuple[Place, Integers, Floats]] = field(default_factory=list)
+    place: DeckPlace | None = None
+    nodes: list[tuple[DeckPlace, Integers, Floats]] = field(default_factory=list)
     blocks: list[ElementBlock] = field(default_factory=list)
     sets: dict[tuple[str, str], Members] = field(default_factory=dict)
     sections: list[Section] = field(default_factory=list)
@@ -190,14 +190,14 @@ class Region:
     translation: Floats = field(default_factory=lambda: np.zeros(3))
     rotation: Floats | None = None
 
-    def members(self, kind: str, spelled: str, place: Place) -> Members:
+    def members(self, kind: str, spelled: str, place: DeckPlace) -> Members:
         """Members of a set or surface, which begins here if its name is new."""
         return self.sets.setdefault((kind, key(spelled)), Members(place, spelled.strip('"')))
 
-    def copied(self) -> Region:
-        """The same for an instance, which may have more."""
+    def copied(self) -> DeckRegion:
+        """Copy for an instance, which may get more."""
         sets = {name: replace(own, parts=[*own.parts]) for name, own in self.sets.items()}
-        return Region(
+        return DeckRegion(
             self.place, [*self.nodes], [*self.blocks], sets, [*self.sections], dict(self.orientations)
         )  # fmt: skip
 
@@ -221,14 +221,14 @@ class Surface:
 
     Attributes
     ----------
-    place : Place
+    place : DeckPlace
     faces : (k, 2) int array
         Rows of elements, and numbers of their faces from 0; -1 for the element itself, of lower dimension than bodies.
     nodes : (k,) int array or None
         Rows of its nodes, of a surface of nodes.
     """
 
-    place: Place
+    place: DeckPlace
     faces: Integers
     nodes: Integers | None = None
 
@@ -283,7 +283,7 @@ class Deck:
         """Numbers (M,) of all elements in the deck."""
         return np.concatenate([np.zeros(0, dtype=np.int64), *(block.labels for block in self.blocks)])
 
-    def nodes_of(self, name: str, place: Place) -> Integers:
+    def nodes_of(self, name: str, place: DeckPlace) -> Integers:
         """Rows of the nodes that a card names: a number, a set, or either of an instance ("L-1.3", "L-1.FLOOR").
 
         Raises
@@ -293,7 +293,7 @@ class Deck:
         """
         return self._rows(name, place, "node", self.node_sets, self.node_labels, 0)
 
-    def elements_of(self, name: str, place: Place) -> Integers:
+    def elements_of(self, name: str, place: DeckPlace) -> Integers:
         """Rows of the elements that a card names, as `nodes_of` those of nodes.
 
         Raises
@@ -312,7 +312,7 @@ class Deck:
         return self._name(row, self.element_labels, 2)
 
     def _rows(
-        self, name: str, place: Place, what: str, sets: dict[str, Integers], labels: Integers, column: int
+        self, name: str, place: DeckPlace, what: str, sets: dict[str, Integers], labels: Integers, column: int
     ) -> Integers:
         instance, _, number = name.strip().rpartition(".")
         if is_number(number) and key(instance) in self.instances:

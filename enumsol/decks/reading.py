@@ -13,7 +13,7 @@ from enumsol.decks.model import Deck
 from enumsol.decks.registry import Reading, compact
 
 
-def described(path: Path, *, ignore: Collection[str] = ()) -> Deck:
+def described(path: Path, *, ignore: Collection[str] = (), bare: bool = False) -> Deck:
     r"""Description of a deck.
 
     Parameters
@@ -21,6 +21,8 @@ def described(path: Path, *, ignore: Collection[str] = ()) -> Deck:
     path : Path
     ignore : collection of str
         Names of cards and of types of elements that are passed over.
+    bare : bool
+        Read the mesh alone: cards of loads, materials, contact and the like are not looked at.
 
     Raises
     ------
@@ -37,7 +39,7 @@ def described(path: Path, *, ignore: Collection[str] = ()) -> Deck:
     >>> deck.element_sets, [entry.became for entry in deck.account]
     ({'ALL': array([0])}, ['3 nodes', '1 element of type CPS3'])
     """
-    reading = Reading(Deck(path), frozenset(map(compact, ignore)))
+    reading = Reading(Deck(path), frozenset(map(compact, ignore)), bare)
     for each in cards_of(path):
         reading.read(each)
     return put_together(reading)

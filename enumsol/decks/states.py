@@ -14,9 +14,9 @@ import numpy as np
 from enumsol.errors import InvalidArgumentError
 
 if TYPE_CHECKING:
-    from enumsol.decks.cards import Place
+    from enumsol.decks.cards import DeckPlace
     from enumsol.decks.model import Deck
-    from enumsol.decks.steps import Act, Step
+    from enumsol.decks.steps import Act, DeckStep
     from enumsol.support.array_types import Integers
 
 #: What a value is given to: the card's kind, the number of a node or an element, and a component, a face or a label.
@@ -27,7 +27,7 @@ _ROUNDED = 1e-3
 
 
 @dataclass
-class State:
+class DeckState:
     """What is given at the end of a step.
 
     Attributes
@@ -35,19 +35,19 @@ class State:
     values : dict of Key to float
         Displacements ("BOUNDARY", node, component), forces ("CLOAD", node, component), loads on elements ("DLOAD",
         element, label), gravity ("GRAV", set, direction) and temperatures ("TEMPERATURE", node, 0).
-    places : dict of Key to Place
+    places : dict of Key to DeckPlace
         The line that gave each.
     """
 
     values: dict[Key, float] = field(default_factory=dict)
-    places: dict[Key, Place] = field(default_factory=dict)
+    places: dict[Key, DeckPlace] = field(default_factory=dict)
 
     def of(self, kind: str) -> dict[tuple[int | str, int | str], float]:
         """The values of one kind, by node or element and what is given to it."""
         return {(of, what): value for (own, of, what), value in self.values.items() if own == kind}
 
 
-def states_of(deck: Deck) -> list[State]:
+def states_of(deck: Deck) -> list[DeckState]:
     """The state at the end of every step.
 
     Raises
@@ -71,10 +71,10 @@ class _Acting:
     def __init__(self, deck: Deck) -> None:
         self._deck, self._amplitudes = deck, deck.analysis.amplitudes
         self._terms: dict[Key, list[tuple[float, str | None]]] = {}
-        self._places: dict[Key, Place] = {}
+        self._places: dict[Key, DeckPlace] = {}
         self._period, self._time = 0.0, 0.0
 
-    def take(self, step: Step, time: float) -> None:
+    def take(self, step: DeckStep, time: float) -> None:
         """Put the cards of a step into effect, which ends at this time."""
         # what has ended keeps its last value, but for amplitudes over the time of all steps
         for key, terms in self._terms.items():
@@ -84,7 +84,7 @@ class _Acting:
             kinds = (kind, "GRAV") if kind == "DLOAD" else (kind,)
             for key in [key for key in self._terms if key[0] in kinds]:
                 del self._terms[key], self._places[key]
-        given: dict[Key, Place] = {}
+        given: dict[Key, DeckPlace] = {}
         for act in step.acts:
             if act.amplitude is not None and act.amplitude not in self._amplitudes:
                 known = ", ".join(self._amplitudes) or "none"
@@ -94,7 +94,7 @@ class _Acting:
             for key, reference in _given_to(self._deck, act):
                 self._give(key, (reference, act.amplitude), act, given)
 
-    def _give(self, key: Key, term: tuple[float, str | None], act: Act, given: dict[Key, Place]) -> None:
+    def _give(self, key: Key, term: tuple[float, str | None], act: Act, given: dict[Key, DeckPlace]) -> None:
         if key in given and key[0] == "CLOAD":
             self._terms[key].append(term)
             return
@@ -115,9 +115,9 @@ class _Acting:
         amplitude = self._amplitudes[name]
         return reference * amplitude.at(self._time if amplitude.total else self._period)
 
-    def state(self) -> State:
+    def state(self) -> DeckState:
         values = {key: sum(map(self._value, terms)) for key, terms in self._terms.items()}
-        return State(values, dict(self._places))
+        return DeckState(values, dict(self._places))
 
     def _named(self, key: Key) -> str:
         kind, of, what = key

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 from enumsol.decks.cards import is_number, key
 from enumsol.decks.registry import card
-from enumsol.decks.steps import Act, Amplitude, Step
+from enumsol.decks.steps import Act, Amplitude, DeckStep
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -44,7 +44,7 @@ def step(reading: Reading, given: Card) -> str:
     if large and "NLGEOM" not in reading.ignore:
         raise given.refused("has NLGEOM, large displacements; expected small ones, or NLGEOM among what is ignored")
     reading.analysis.steps.append(
-        Step(given.place, given.options.get("NAME", "") or f"step {len(reading.analysis.steps) + 1}")
+        DeckStep(given.place, given.options.get("NAME", "") or f"step {len(reading.analysis.steps) + 1}")
     )
     return f"step {len(reading.analysis.steps)}" + ("; NLGEOM is ignored: displacements are small" if large else "")
 
@@ -215,7 +215,7 @@ def _without_following(given: Card) -> None:
         raise given.refused("has FOLLOWER; expected loads that keep their direction")
 
 
-def _step(reading: Reading, given: Card) -> Step:
+def _step(reading: Reading, given: Card) -> DeckStep:
     """The step that a card is in."""
     if not reading.analysis.steps or reading.analysis.steps[-1].ended:
         raise given.refused("stands outside of steps; expected it between *STEP and *END STEP")

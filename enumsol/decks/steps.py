@@ -7,7 +7,7 @@ from typing import Literal
 
 import numpy as np
 
-from enumsol.decks.cards import Place
+from enumsol.decks.cards import DeckPlace
 
 
 @dataclass(frozen=True)
@@ -18,7 +18,7 @@ class Act:
     ----------
     card : str
         BOUNDARY, CLOAD, DLOAD, DSLOAD or TEMPERATURE.
-    place : Place
+    place : DeckPlace
     target : str
         A number, or the name of a set or of a surface.
     label : str
@@ -31,7 +31,7 @@ class Act:
     """
 
     card: str
-    place: Place
+    place: DeckPlace
     target: str
     label: str = ""
     components: tuple[int, ...] = ()
@@ -60,12 +60,12 @@ class Amplitude:
 
 
 @dataclass
-class Step:
+class DeckStep:
     """A step, or what stands before the first one.
 
     Attributes
     ----------
-    place : Place
+    place : DeckPlace
     name : str
     period : float
         Of time.
@@ -79,7 +79,7 @@ class Step:
         The card of its analysis.
     """
 
-    place: Place | None = None
+    place: DeckPlace | None = None
     name: str = ""
     period: float = 1.0
     acts: list[Act] = field(default_factory=list)
@@ -95,14 +95,14 @@ class Interaction:
 
     Attributes
     ----------
-    place : Place
+    place : DeckPlace
     friction : float
         Coefficient [-].
     tied : bool
         Whether what touches stays joined.
     """
 
-    place: Place
+    place: DeckPlace
     friction: float = 0.0
     tied: bool = False
 
@@ -113,7 +113,7 @@ class ContactPair:
 
     Attributes
     ----------
-    place : Place
+    place : DeckPlace
     slave, master, interaction : str
     adjust : float or None
         Distance up to which nodes are moved onto the other surface before the analysis.
@@ -123,7 +123,7 @@ class ContactPair:
         Whether the two stay joined.
     """
 
-    place: Place
+    place: DeckPlace
     slave: str
     master: str
     interaction: str
@@ -138,7 +138,7 @@ class Tie:
 
     Attributes
     ----------
-    place : Place
+    place : DeckPlace
     name, slave, master : str
     tolerance : float or None
         Distance up to which nodes of the slave surface are joined [length].
@@ -146,7 +146,7 @@ class Tie:
         Whether the nodes are moved onto the other surface before the analysis.
     """
 
-    place: Place
+    place: DeckPlace
     name: str
     slave: str
     master: str
@@ -160,12 +160,12 @@ class Equation:
 
     Attributes
     ----------
-    place : Place
+    place : DeckPlace
     terms : tuple of (target, component, coefficient)
         The target is a number or the name of a set.
     """
 
-    place: Place
+    place: DeckPlace
     terms: tuple[tuple[str, int, float], ...]
 
 
@@ -175,7 +175,7 @@ class Coupling:
 
     Attributes
     ----------
-    place : Place
+    place : DeckPlace
     card : str
         COUPLING, RIGID BODY or MPC.
     target : str
@@ -189,7 +189,7 @@ class Coupling:
         That are coupled.
     """
 
-    place: Place
+    place: DeckPlace
     card: str
     target: str
     reference: str
@@ -204,7 +204,7 @@ class Spring:
 
     Attributes
     ----------
-    place : Place
+    place : DeckPlace
     elements : str
         The set of elements.
     stiffness : float
@@ -213,7 +213,7 @@ class Spring:
         Of its nodes; none where it acts along the line between them.
     """
 
-    place: Place
+    place: DeckPlace
     elements: str
     stiffness: float
     components: tuple[int, ...] = ()
@@ -225,7 +225,7 @@ class Transform:
 
     Attributes
     ----------
-    place : Place
+    place : DeckPlace
     nodes : str
         The set of nodes.
     kind : {"R", "C"}
@@ -234,7 +234,7 @@ class Transform:
         Two points: on the first axis and in the plane of the first two, or on the axis of the cylinder.
     """
 
-    place: Place
+    place: DeckPlace
     nodes: str
     kind: str
     numbers: tuple[float, ...]
@@ -246,9 +246,9 @@ class Analysis:
 
     Attributes
     ----------
-    initial : Step
+    initial : DeckStep
         What stands before the first step.
-    steps : list of Step
+    steps : list of DeckStep
     amplitudes, interactions : dict
         By their names.
     pairs, ties, equations, couplings, springs, transforms : lists
@@ -258,8 +258,8 @@ class Analysis:
         One of which the next card says the kind.
     """
 
-    initial: Step = field(default_factory=Step)
-    steps: list[Step] = field(default_factory=list)
+    initial: DeckStep = field(default_factory=DeckStep)
+    steps: list[DeckStep] = field(default_factory=list)
     amplitudes: dict[str, Amplitude] = field(default_factory=dict)
     interactions: dict[str, Interaction] = field(default_factory=dict)
     pairs: list[ContactPair] = field(default_factory=list)

@@ -5,26 +5,24 @@ Whatever acts on nodes, faces or elements becomes a named part and an option of 
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from enumsol.decks.model import Surface
 from enumsol.errors import InvalidArgumentError
-from enumsol.fem.deck_meshes import mesh_of_deck
+from enumsol.fem.mesh_files import mesh_of_deck
 
 if TYPE_CHECKING:
-    from enumsol.decks.cards import Place
+    from enumsol.decks.cards import DeckPlace
     from enumsol.decks.model import Deck, Section
-    from enumsol.decks.states import State
+    from enumsol.decks.states import DeckState
     from enumsol.decks.steps import ContactPair
     from enumsol.fem.meshes import PartedMesh
     from enumsol.support.array_types import Floats, Integers
 
 #: Families of plane elements, and what `mesh_problem` calls them.
 _PLANES = {"plane strain": "strain", "plane stress": "stress", "axisymmetric": "axisymmetric"}
-
 
 
 class DeckParts:
@@ -43,7 +41,7 @@ class DeckParts:
         """Name of a set of elements."""
         return self._named(self._deck.element_sets, np.unique(rows), wanted, lambda own: own)
 
-    def faces(self, faces: Integers, wanted: str, place: Place) -> str:
+    def faces(self, faces: Integers, wanted: str, place: DeckPlace) -> str:
         """Name of a surface of faces (k, 2)."""
         return self._named(
             self._deck.surfaces,
@@ -101,8 +99,8 @@ def _materials(deck: Deck, parts: DeckParts) -> dict[str, Any]:
         if material.elastic != "ISO":
             kind = f"the law {material.elastic}" if material.elastic else "no *ELASTIC"
             raise InvalidArgumentError(
-                f"{material.elastic_place or material.place}: *MATERIAL {material.name} has {kind}; expected an isotropic "
-                "elastic law"
+                f"{material.elastic_place or material.place}: *MATERIAL {material.name} has {kind}; expected an "
+                "isotropic elastic law"
             )
         found["young"][name], found["poisson"][name] = map(float, material.constants)
         if material.density:
@@ -230,7 +228,7 @@ def friction(deck: Deck, step: int) -> dict[str, float]:
 # -- what acts in a step ---------------------------------------------------------------------------------------------
 
 
-def acting(deck: Deck, parts: DeckParts, state: State) -> dict[str, Any]:
+def acting(deck: Deck, parts: DeckParts, state: DeckState) -> dict[str, Any]:
     """Options for what is given at the end of a step.
 
     Raises
@@ -250,11 +248,11 @@ def acting(deck: Deck, parts: DeckParts, state: State) -> dict[str, Any]:
     return {name: value for name, value in options.items() if value}
 
 
-def _on_nodes(deck: Deck, parts: DeckParts, state: State, kind: str, free: float | None) -> dict[str, list[Any]]:
+def _on_nodes(deck: Deck, parts: DeckParts, state: DeckState, kind: str, free: float | None) -> dict[str, list[Any]]:
     """Displacements or forces by sets of nodes: nodes for which the same lines give the same."""
     dimension = 2 if _is_plane(deck) else 3
     of_node: dict[int, dict[int, float]] = {}
-    by: dict[int, list[Place]] = {}
+    by: dict[int, list[DeckPlace]] = {}
     for (node, component), value in state.of(kind).items():
         place = state.places[kind, node, component]
         if int(component) > dimension:
@@ -290,9 +288,9 @@ def _wanted(deck: Deck, rows: Integers, otherwise: str) -> str:
     return next(same, otherwise)
 
 
-def _pressures(deck: Deck, parts: DeckParts, state: State) -> dict[str, float]:
+def _pressures(deck: Deck, parts: DeckParts, state: DeckState) -> dict[str, float]:
     """Pressures by surfaces."""
-    groups: dict[tuple[Place, float], list[tuple[int, int]]] = {}
+    groups: dict[tuple[DeckPlace, float], list[tuple[int, int]]] = {}
     for (element, label), value in state.of("DLOAD").items():
         if str(label).startswith("P") and value:
             face = int(str(label)[1:]) - 1
@@ -305,7 +303,7 @@ def _pressures(deck: Deck, parts: DeckParts, state: State) -> dict[str, float]:
     return found
 
 
-def _volume_forces(deck: Deck, parts: DeckParts, state: State) -> dict[str, list[float]]:
+def _volume_forces(deck: Deck, parts: DeckParts, state: DeckState) -> dict[str, list[float]]:
     """Forces per volume by sets of elements: gravity by the density of each material, and those that are given."""
     dimension = 2 if _is_plane(deck) else 3
     total: dict[int, Floats] = {}

@@ -26,7 +26,7 @@ if TYPE_CHECKING:
     import os
 
     from enumsol.decks.model import Deck
-    from enumsol.decks.states import State
+    from enumsol.decks.states import DeckState
     from enumsol.fem.meshes import PartedMesh
     from enumsol.fem.scenes import Scene
     from enumsol.model.problem3d import AnyProblem
@@ -35,8 +35,9 @@ if TYPE_CHECKING:
 def read_deck(path: str | os.PathLike[str], *, ignore: Collection[str] = ()) -> DeckModel:
     """Model that a deck of CalculiX or Abaqus describes: a contact problem for every step, and a history of them.
 
-    ``print(read_deck("model.inp"))`` says what became of every card. Nothing of a deck is dropped without a word: a card
-    that is not used is named with its line, and one that would change the answer is refused, unless ``ignore`` names it.
+    ``print(read_deck("model.inp"))`` says what became of every card. Nothing of a deck is dropped without a word: a
+    card that is not used is named with its line, and one that would change the answer is refused, unless ``ignore``
+    names it.
 
     Parameters
     ----------
@@ -88,14 +89,15 @@ class DeckModel:
     _scenes: dict[int, Scene] = field(init=False, repr=False, default_factory=dict)
 
     def __post_init__(self) -> None:
+        states = self._states()
         self._parts = DeckParts(self.deck)
         common = shared(self.deck, self._parts)
         self._options = [
             {**common, **acting(self.deck, self._parts, state), "friction": friction(self.deck, number)}
-            for number, state in enumerate(self._states(), 1)
+            for number, state in enumerate(states, 1)
         ]
 
-    def _states(self) -> list[State]:
+    def _states(self) -> list[DeckState]:
         steps = self.deck.analysis.steps
         if not steps:
             raise InvalidArgumentError(

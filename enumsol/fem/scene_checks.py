@@ -7,12 +7,12 @@ from collections.abc import Mapping
 import numpy as np
 import scipy.sparse as sp
 
+from enumsol.decks.elements import element_type
 from enumsol.errors import InvalidArgumentError
 from enumsol.fem.assembly import outward_normal
 from enumsol.fem.bases import SIMPLICES, corners_of, place_of
 from enumsol.fem.conditions import holding
 from enumsol.fem.contacts import Group, faced
-from enumsol.fem.file_counts import taken_as
 from enumsol.fem.meshes import SAME, PartedMesh, cell_name, unit_vectors
 from enumsol.fem.scenes import Scene
 from enumsol.model.cells import boundary_facets
@@ -188,7 +188,13 @@ def scene_notes(scene: Scene) -> list[str]:
 
 def _formulations(scene: Scene) -> list[str]:
     """Notes on elements of the file that others take the place of."""
-    return taken_as(scene.mesh.types)
+    kinds = [kind for kind in map(element_type, scene.mesh.types) if kind is not None and kind.is_body]
+    return [
+        f"elements of type {kind.name} are taken as {kind.plain}, with full integration and without incompatible "
+        "modes, hybrid or modified formulations, which can be stiffer in bending than the program of the file has them"
+        for kind in kinds
+        if kind.name != kind.plain
+    ]
 
 
 def _unjoined(scene: Scene) -> list[str]:

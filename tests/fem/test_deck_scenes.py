@@ -141,7 +141,9 @@ def test_what_cannot_be_used_is_refused_in_one_sentence_with_its_line(read, name
 
 
 def test_what_is_ignored_is_said(read):
-    text = deck(materials=MATERIALS.replace("*DENSITY\n2.", "*PLASTIC\n1., 0."), steps=step(DOWN + PUSH, ", NLGEOM, INC=100"))
+    text = deck(
+        materials=MATERIALS.replace("*DENSITY\n2.", "*PLASTIC\n1., 0."), steps=step(DOWN + PUSH, ", NLGEOM, INC=100")
+    )
     model = read(text, ignore=["plastic", "NLGEOM"])
     assert_same(model.problem(), by_hand(density=None))
     assert "*PLASTIC              not used, as you say" in str(model)

@@ -87,7 +87,13 @@ def mesh(facets=(), nodes=(), bodies=()):
     """The same mesh by hand, with more parts by rows of nodes or of cells."""
     points = [[0, 0], [1, 0], [2, 0], [0, 1], [1, 1], [2, 1], [0, 1], [1, 1], [2, 1], [0, 3], [1, 3], [2, 3]]
     cells = [[0, 1, 4, 3], [1, 2, 5, 4], [6, 7, 10, 9], [7, 8, 11, 10]]
-    named = {"UNDER": [[6, 7], [7, 8]], "ON": [[5, 4], [4, 3]], "ABOVE": [[11, 10], [10, 9]], "RIGHT": [[8, 11]], **dict(facets)}
+    named = {
+        "UNDER": [[6, 7], [7, 8]],
+        "ON": [[5, 4], [4, 3]],
+        "ABOVE": [[11, 10], [10, 9]],
+        "RIGHT": [[8, 11]],
+        **dict(facets),
+    }
     sets = {"BOTTOM": [0, 1, 2], "TOP": [9, 10, 11], "SIDE": [6, 9], **dict(nodes)}
     parts = {"LOWER": [0, 1], "UPPER": [2, 3], **dict(bodies)}
     return fem.PartedMesh(

@@ -1,4 +1,4 @@
-"""A judge of stability proofs that follows docs/proof_format.md, section 10, in balls of many digits.
+"""A judge of stability proofs that follows docs/proof_format.md and nothing else, in balls of many digits.
 
 It imports nothing of enumsol; of a problem it reads the arrays. Roots are enclosed anew from displacements and forces
 together, which serves bodies that nothing holds, too; their number is that of the proof of the roots, which the judges
