@@ -5,11 +5,10 @@ from __future__ import annotations
 import shlex
 from collections.abc import Callable
 from contextvars import ContextVar
-from dataclasses import dataclass
 from functools import lru_cache, wraps
 from inspect import Parameter
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any, NamedTuple
 
 import typer
 
@@ -44,15 +43,14 @@ OPTIONS = [
 ]
 
 
-@dataclass(frozen=True)
-class _Chosen:
+class _Chosen(NamedTuple):
     """What a command's options say about decks."""
 
     ignore: tuple[str, ...] = ()
     step: int | None = None
 
 
-_CHOSEN = ContextVar("enumsol_deck", default=_Chosen())
+_CHOSEN: ContextVar[_Chosen] = ContextVar("enumsol_deck", default=_Chosen())  # noqa: B039 (it is immutable)
 
 
 def with_decks(

@@ -254,7 +254,7 @@ def solve(
         if output is not None:
             return
         raise InvalidArgumentError("--alpha is missing, on which friction or load depend; expected it, or --output")
-    source = output if output is not None else mesh if mesh.endswith(TOML) or is_deck(mesh) and not given else None
+    source = output if output is not None else mesh if mesh.endswith(TOML) or (is_deck(mesh) and not given) else None
     search.answer(mesh, problem, value or 0.0, source, scene)
 
 
@@ -272,8 +272,9 @@ def _scene(mesh: str, options: dict[str, Any]) -> Scene:
             flag = _flags(next(iter(options)))[0]
             raise InvalidArgumentError(f"{flag} is given beside {mesh}, which has all options; expected it there")
         refuse_misspelt(mesh)
-    if (found := scene_of(mesh) if mesh.endswith(TOML) or (is_deck(mesh) and not options) else None) is not None:
-        return found
+    whole = scene_of(mesh) if mesh.endswith(TOML) or (is_deck(mesh) and not options) else None
+    if whole is not None:
+        return whole
     place = file_path(mesh, "MESH", "the name of a mesh file")
     if place.suffix in SUFFIXES or mesh.startswith(GALLERY):
         raise InvalidArgumentError(f"{mesh} is a problem; expected a mesh (enumsol roots {mesh} solves a problem)")

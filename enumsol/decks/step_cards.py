@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from itertools import pairwise
 from typing import TYPE_CHECKING
 
 from enumsol.decks.cards import is_number, key
@@ -171,7 +172,7 @@ def amplitude(reading: Reading, given: Card) -> str:
         raise given.refused("has USER, SHIFTX or SHIFTY; expected a plain table of times and factors")
     numbers = [given.number(entry, row) for row, entries in given.rows() for entry in entries]
     times, factors = numbers[::2], numbers[1::2]
-    if len(times) != len(factors) or not times or any(b < a for a, b in zip(times, times[1:], strict=False)):
+    if len(times) != len(factors) or not times or any(b < a for a, b in pairwise(times)):
         raise given.refused("has no pairs of rising times and factors; expected time, factor, time, factor, ...")
     total = given.name_of("TIME").replace(" ", "") == "TOTALTIME"
     reading.analysis.amplitudes[name] = Amplitude(tuple(times), tuple(factors), total)

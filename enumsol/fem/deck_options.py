@@ -187,11 +187,12 @@ def _contacts(deck: Deck) -> dict[str, Any]:
         if pair.tied or said.interactions[pair.interaction].tied:
             raise InvalidArgumentError(f"{pair.place}: the surfaces of *CONTACT PAIR are tied, which is not read")
         pairs.append((pair.slave, pair.master, *_gap(pair)))
-    for others, card in ((said.ties, "TIE"), (said.equations, "EQUATION"), (said.springs, "SPRING")):
-        if others:
-            raise InvalidArgumentError(f"{others[0].place}: *{card} is not read")
-    for other in (*said.couplings, *said.transforms):
-        raise InvalidArgumentError(f"{other.place}: *{getattr(other, 'card', 'TRANSFORM')} is not read")
+    others = ("TIE", said.ties), ("EQUATION", said.equations), ("SPRING", said.springs), ("TRANSFORM", said.transforms)
+    for card, each in others:
+        for own in each:
+            raise InvalidArgumentError(f"{own.place}: *{card} is not used here, and would change the answer")
+    for coupling in said.couplings:
+        raise InvalidArgumentError(f"{coupling.place}: *{coupling.card} is not used here, and would change the answer")
     return {"pairs": pairs}
 
 
@@ -327,8 +328,8 @@ def _volume_forces(deck: Deck, parts: DeckParts, state: DeckState) -> dict[str, 
     for row, force in total.items():
         groups.setdefault(tuple(force.tolist()), []).append(row)
     found = {}
-    for force, rows in groups.items():
-        if any(force[dimension:]):
+    for vector, elements in groups.items():
+        if any(vector[dimension:]):
             raise InvalidArgumentError(f"{deck.path}: a force per volume acts across the plane of plane elements")
-        found[parts.elements(np.array(rows), "volume force")] = list(force[:dimension])
+        found[parts.elements(np.array(elements), "volume force")] = list(vector[:dimension])
     return found

@@ -1,4 +1,5 @@
 """Decks with one card more or less, against the same problem described by hand, and in one sentence where it cannot be."""
+# ruff: noqa: E501 (tables of decks)
 
 import numpy as np
 import pytest
