@@ -44,7 +44,7 @@ OPTIONS = [
 
 
 class _Chosen(NamedTuple):
-    """What a command's options say about decks."""
+    """Options of a command that are about decks."""
 
     ignore: tuple[str, ...] = ()
     step: int | None = None

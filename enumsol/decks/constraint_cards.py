@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Literal
 
 from enumsol.decks.cards import is_number, key
 from enumsol.decks.registry import card
-from enumsol.decks.steps import Coupling, Equation, Spring, Transform
+from enumsol.decks.steps import Coupling, NodalEquation, Spring, Transform
 from enumsol.support.messages import counted
 
 if TYPE_CHECKING:
@@ -35,7 +35,7 @@ def equation(reading: Reading, given: Card) -> str:
             at += 1
         if len(terms) != wanted or wanted < 1:
             raise given.refused(f"has {len(terms)} terms; expected {wanted}", row)
-        reading.analysis.equations.append(Equation(given.at(row), tuple(terms)))
+        reading.analysis.equations.append(NodalEquation(given.at(row), tuple(terms)))
         count += 1
     return counted(count, "linear equation")
 
@@ -52,7 +52,7 @@ def mpc(reading: Reading, given: Card) -> str:
         if kind == "BEAM":
             reading.analysis.couplings.append(Coupling(place, given.name, one, two))
         else:
-            reading.analysis.equations += [Equation(place, ((one, k, 1.0), (two, k, -1.0))) for k in (1, 2, 3)]
+            reading.analysis.equations += [NodalEquation(place, ((one, k, 1.0), (two, k, -1.0))) for k in (1, 2, 3)]
     return "nodes that move together"
 
 

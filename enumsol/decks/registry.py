@@ -51,7 +51,7 @@ class Reading:
 
     @property
     def analysis(self) -> Analysis:
-        """What cards of steps, contacts and constraints are put into."""
+        """Description that cards of steps, contacts and constraints are put into."""
         return self.deck.analysis
 
     @property

@@ -1,4 +1,4 @@
-"""What acts on a deck at the end of each of its steps, by nodes and elements: the cards of steps put into effect.
+"""Loads, displacements and temperatures at the end of each step of a deck: its cards put into effect.
 
 Displacements, loads and temperatures of a step stay in later ones (OP=MOD) unless a card of their kind begins anew
 (OP=NEW) or gives them again. Within a step concentrated forces on one node add up, as the programs have it.
@@ -28,7 +28,7 @@ _ROUNDED = 1e-3
 
 @dataclass
 class DeckState:
-    """What is given at the end of a step.
+    """State at the end of a step: what is given then.
 
     Attributes
     ----------

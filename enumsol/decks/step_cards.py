@@ -196,7 +196,7 @@ def change_friction(reading: Reading, given: Card) -> str:
 def _act(
     given: Card, row: int, entries: list[str], label: str, components: tuple[int, ...], values: tuple[float, ...]
 ) -> Act:
-    """What one line gives."""
+    """Act of one line."""
     named = entries[0] if entries else ""
     if not named:
         raise given.refused("has a line without a node, an element or a set; expected one of them", row)

@@ -12,7 +12,7 @@ from enumsol.decks.cards import DeckPlace
 
 @dataclass(frozen=True)
 class Act:
-    """What a data line of a card gives to nodes or elements.
+    """Values that a data line of a card gives to nodes or elements.
 
     Attributes
     ----------
@@ -155,7 +155,7 @@ class Tie:
 
 
 @dataclass(frozen=True)
-class Equation:
+class NodalEquation:
     """A homogeneous linear equation between components of nodes.
 
     Attributes
@@ -242,7 +242,7 @@ class Transform:
 
 @dataclass
 class Analysis:
-    """What the cards of steps, contacts and constraints of a deck say, in their order.
+    """Steps, contacts and constraints of a deck as its cards say them, in their order.
 
     Attributes
     ----------
@@ -264,7 +264,7 @@ class Analysis:
     interactions: dict[str, Interaction] = field(default_factory=dict)
     pairs: list[ContactPair] = field(default_factory=list)
     ties: list[Tie] = field(default_factory=list)
-    equations: list[Equation] = field(default_factory=list)
+    equations: list[NodalEquation] = field(default_factory=list)
     couplings: list[Coupling] = field(default_factory=list)
     springs: list[Spring] = field(default_factory=list)
     transforms: list[Transform] = field(default_factory=list)

@@ -1,4 +1,4 @@
-"""What a deck says as options of `mesh_problem`, by parts of the mesh that are named for it.
+"""Options of `mesh_problem` that a deck says, by parts of the mesh that are named for it.
 
 Whatever acts on nodes, faces or elements becomes a named part and an option of this name.
 """

@@ -198,7 +198,7 @@ class DeckModel:
 
 
 def account_of(deck: Deck) -> str:
-    """What became of the cards of a deck, as a table; of cards of one kind that became the same, with all lines."""
+    """Table of what became of the cards of a deck: of cards of one kind that became the same, with all lines."""
     rows: dict[tuple[str, str, str], list[int]] = {}
     for entry in deck.account:
         rows.setdefault((entry.place.file, entry.card, entry.became), []).append(entry.place.line)
@@ -213,7 +213,7 @@ def _lines(lines: list[int]) -> str:
 
 
 def _differs(first: AnyProblem, other: AnyProblem) -> str | None:
-    """What two problems differ in but for load and friction."""
+    """Data that two problems do not share but for load and friction, in words."""
     if first.n != other.n or first.p != other.p:
         return "what is held"
     if (first.A != other.A).nnz:
