@@ -143,7 +143,12 @@ def block_on_slab(kind, n, friction=0.3):
     deck.contact(f"BLOCK_{up}0", f"SLAB_{up}1", friction, 1e6)
     deck.lines += ["*BOUNDARY", f"NSLAB_{up}0,1,{d}"]
     # the block's far side is moved down and along, which holds it without contact
-    deck.step("*BOUNDARY", f"NBLOCK_{up}1,1,1,4e-4", *([f"NBLOCK_{up}1,2,2,0"] if d == 3 else []), f"NBLOCK_{up}1,{d},{d},-2e-3")
+    deck.step(
+        "*BOUNDARY",
+        f"NBLOCK_{up}1,1,1,4e-4",
+        *([f"NBLOCK_{up}1,2,2,0"] if d == 3 else []),
+        f"NBLOCK_{up}1,{d},{d},-2e-3",
+    )
     return deck.text()
 
 

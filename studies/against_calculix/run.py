@@ -34,16 +34,24 @@ def compared(name, cells, folder):
     make, kind = CASES[name]
     file = Path(folder) / f"{name.replace(' ', '_')}_{cells}.inp"
     file.write_text(make(kind, cells))
-    problem = enumsol.read_deck(file).problem()
+    model = enumsol.read_deck(file)
+    problem = model.problem()
     roots = enumsol.enumerate_roots(problem, 0)
-    row = {"deck": name, "cells": cells, "n": problem.n, "p": problem.p, "roots": len(roots), "complete": roots.complete}
+    row = {
+        "deck": name,
+        "cells": cells,
+        "n": problem.n,
+        "p": problem.p,
+        "roots": len(roots),
+        "complete": roots.complete,
+    }
     if shutil.which("ccx") is None:
         return row | {"difference": "-", "audit": "-"}
-    done = subprocess.run(["ccx", file.stem], cwd=folder, capture_output=True, text=True, check=False)  # noqa: S607
+    done = subprocess.run(["ccx", file.stem], cwd=folder, capture_output=True, text=True, check=False)
     if "Job finished" not in done.stdout or "ERROR" in done.stdout:
         return row | {"difference": "-", "audit": "CalculiX found no result"}
     result = enumsol.read_results(file.with_suffix(".dat"))[-1]
-    audit = enumsol.compare_result(problem, roots, result.on(problem.mesh, numbers_of(file)))
+    audit = enumsol.compare_result(problem, roots, result.on(problem.mesh, model.node_names))
     return row | {"difference": min(audit.distances.values()), "audit": audit.found is not None}
 
 
@@ -57,8 +65,8 @@ def conclusion(rows):
     falls = [name for name, values in by_deck.items() if values[-1] < values[0]]
     last = [values[-1] for values in by_deck.values()]
     return (
-        f"Conclusion: on the finest meshes the displacements differ by {100 * min(last):.2g} to {100 * max(last):.2g} % of "
-        f"the largest; the difference falls with the size of the cells on {len(falls)} of {len(by_deck)} decks."
+        f"Conclusion: on the finest meshes the displacements differ by {100 * min(last):.2g} to {100 * max(last):.2g} % "
+        f"of the largest; the difference falls with the size of the cells on {len(falls)} of {len(by_deck)} decks."
     )
 
 
