@@ -1,4 +1,4 @@
-"""Decks of one body on another, in 2D, axisymmetric and in 3D, by the type of their elements and the size of their cells."""
+"""Decks of one body on another, in 2D, axisymmetric and in 3D, by the type of their elements and the size of cells."""
 
 from __future__ import annotations
 

@@ -65,8 +65,8 @@ def conclusion(rows):
     falls = [name for name, values in by_deck.items() if values[-1] < values[0]]
     last = [values[-1] for values in by_deck.values()]
     return (
-        f"Conclusion: on the finest meshes the displacements differ by {100 * min(last):.2g} to {100 * max(last):.2g} % "
-        f"of the largest; the difference falls with the size of the cells on {len(falls)} of {len(by_deck)} decks."
+        f"Conclusion: on the finest meshes the displacements differ by {100 * min(last):.2g} to {100 * max(last):.2g} "
+        f"% of the largest; the difference falls with the size of the cells on {len(falls)} of {len(by_deck)} decks."
     )
 
 
