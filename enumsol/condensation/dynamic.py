@@ -107,8 +107,6 @@ class DynamicStiffness:
     ) -> None:
         self.A, self.M, self.rows, self._modes, self.springs = A, M, rows, modes, springs
         self._rest, self._known = rest, dict[float, Ball | None]()
-        #: What a search keeps of it in floats.
-        self.spectrum: Any = None
 
     def at(self, mu: float) -> Ball | None:
         """K(mu), (m, m) [force / length]; None where it is not enclosed."""
