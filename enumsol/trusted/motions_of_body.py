@@ -210,6 +210,32 @@ def friction_over(problem: AnyProblem, low: AlphaLike, high: AlphaLike) -> list[
     return balls
 
 
+def friction_changes(setting: Setting, F: list[Ball], rates: Floats, forces: Floats) -> Ball:
+    """Rates that changes of F add to r of the nodes at their limit of a part, (l,) (theory, section 15.5).
+
+    Parameters
+    ----------
+    F : list of Balls (p,)
+        Coefficients by axis.
+    rates : (p, 1) or (p, 2) array
+        Their derivatives.
+    forces : (p, 1, 2) or (p, 2, 2) array
+        Bounds of lambda_t.
+    """
+    p, place = len(forces), {row: at for at, row in enumerate(setting.rows)}
+    found = []
+    for k, i in enumerate(setting.limits):
+        # r is F' times y_n - d'(y_t / F), F' the larger coefficient, and R has F' d / F
+        total = Ball.exact(np.zeros(1))
+        for axis, own in enumerate(F):
+            if (row := place.get((axis + 1) * p + i)) is not None:
+                force = hull([Ball.exact(end) for end in forces[i, axis]])
+                share = setting.motions.moves[row, k : k + 1] * force * _reciprocal(own[i])
+                total = total + share * Ball.exact(rates[i, axis : axis + 1])
+        found.append(total)
+    return Ball.joined(*found)
+
+
 def _kind(held: Collection[int], friction: bool) -> str:
     """The kind of a node: stay open or stuck, slide at its limit, or leave where it touches without force."""
     codes = set(held)
@@ -226,7 +252,7 @@ def _limit(held: Collection[int], F: list[Ball], i: int, forces: Floats | None) 
         sign = 1.0 if SLIP_PLUS in held else -1.0
         return [Ball.exact(np.array(sign))], F[0][i]
     assert forces is not None
-    inverse = [reciprocal(f[i]) for f in F]
+    inverse = [_reciprocal(f[i]) for f in F]
     force = [hull([Ball.exact(end) for end in ends]) for ends in forces[i]]
     shares = [x * y for x, y in zip(force, inverse, strict=True)]
     length = float(np.hypot(*(x.mid for x in shares))) or TINY
@@ -240,7 +266,7 @@ def _limit(held: Collection[int], F: list[Ball], i: int, forces: Floats | None) 
     return moves, Ball.exact(np.array(typical))
 
 
-def reciprocal(F: Ball) -> Ball:
+def _reciprocal(F: Ball) -> Ball:
     """1 / F; of no friction at all zero, since no force is along that axis."""
     mid = float(F.mid)
     return (

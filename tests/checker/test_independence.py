@@ -67,7 +67,7 @@ SHARED = {
     "trusted.uniqueness": {*("ClosedSolution", "closed_solution", "numbers_of", "only_solution", "same_solution")},
     "trusted.at_alpha": {"VerifiedSelection", "settled_selection", "solve_selection"},
     "trusted.precise_at_alpha": {"PreciseAtAlpha"},
-    "trusted.motions_of_body": {"BodyMotions", "Setting", "friction_over"},
+    "trusted.motions_of_body": {"BodyMotions", "Setting", "friction_changes", "friction_over"},
     "trusted.running_away": None,
     "trusted.quadratic_forms": {"EnclosedForm", "Equations", "QuadraticForm"},
     "trusted.status_rows": None,
