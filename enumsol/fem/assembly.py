@@ -19,7 +19,7 @@ import scipy.sparse as sp
 
 from enumsol.errors import InvalidArgumentError
 from enumsol.fem import meshes
-from enumsol.fem.bases import FLAT, between_corners, facet_basis, nodal_basis
+from enumsol.fem.bases import FLAT, between_corners, facet_basis, isotropic, nodal_basis
 from enumsol.fem.meshes import SAME, unit_vectors, vectors_of_all
 from enumsol.fem.restrained import Body, Supports, axes_of, gathered, movable, problem_of
 from enumsol.model.cells import numbers_of_nodes
@@ -75,7 +75,7 @@ def stiffness(points: ArrayLike, cells: ArrayLike, lame: tuple[float, float]) ->
     (12, 12)
     """
     lam, mu = meshes.lame_coefficients(lame, 2)
-    return nodal_basis(*plane_mesh(points, cells)).stiffness(lam, mu)
+    return nodal_basis(*plane_mesh(points, cells)).stiffness(isotropic(np.array([lam, mu]), 3))
 
 
 def plane_mesh(points: ArrayLike, cells: ArrayLike) -> tuple[Floats, Integers]:
