@@ -164,7 +164,7 @@ def _extended(proven: Proven, setting: Setting) -> bool | tuple[float, float]:
             place = float(np.log2(at)) / step
             below = np.floor(place - 0.25)
             low, high = (float(np.exp2(step * (below + k))) for k in (0, 1 if place - below < 0.75 else 2))
-            wider = Growing(low, high, tried.slides, tried.touching)
+            wider = Growing(low, high, tried.way)
             if wider.found(stiffness, motions) is not None:
                 return rate_bounds(low, high)
     if proven.growing or proven.gaps or not everywhere(proven.ranges):

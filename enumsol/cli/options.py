@@ -31,6 +31,7 @@ _SHARED = {
     "time_limit": "Stop after this time.",
     "jobs": "Number of processes that search.",
     "json_file": "Write the result as JSON; - is stdout.",
+    "frd_file": "Write deformed bodies with forces and stresses for CGX; every root is a step of the file.",
     "vtu_file": "Write deformed bodies with forces and stresses for ParaView; of several roots FILE-0.vtu, ...",
     "plot_file": "Draw a figure: .png, .pdf, .svg.",
     "units": "Units of what is printed and drawn, such as N,mm.",

@@ -106,6 +106,18 @@ def check_places(path: str | None, problem: AnyProblem, name: str) -> None:
         raise InvalidArgumentError(f"--vtu is given, but {name} has neither mesh nor coordinates; expected one of them")
 
 
+def check_mesh(path: str | None, problem: AnyProblem, name: str) -> None:
+    """Refuse files for CGX of a problem that has no mesh, before the search.
+
+    Raises
+    ------
+    InvalidArgumentError
+        The problem, which is called ``name``, has no mesh.
+    """
+    if path is not None and problem.mesh is None:
+        raise InvalidArgumentError(f"--frd is given, but {name} has no mesh; expected a problem made of one")
+
+
 def check_scripts(path: str | None, problem: AnyProblem) -> None:
     """Refuse a page that plotly's script draws, before the search.
 

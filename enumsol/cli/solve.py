@@ -70,7 +70,7 @@ def _as_given(text: str, option: str) -> str:
 
 
 def _entry(part: str, option: str, text: str) -> Any:
-    if part.strip() == "free" and option == "--displacement":
+    if part.strip() == "free" and option.startswith("--displacement"):
         return "free"
     try:
         return float(part)
@@ -133,6 +133,7 @@ MESH_OPTIONS = {
     "clamp": Given(_SUPPORT, "NAME", _as_given),
     "symmetry": Given(_SUPPORT, "NAME", _as_given),
     "displacement": Given(_SUPPORT, "NAME=ux,uy[,uz]", _numbers),
+    "displacement_slope": Given(_SUPPORT, "NAME=ux,uy[,uz]", _numbers),
     "spring": Given(_SUPPORT, "NAME=kn,kt", _numbers),
     "max_rigid_displacement": Given(_SUPPORT, "LENGTH|auto", _auto_or_number, False),
     "load": Given(_LOAD, _PULL, _numbers),
@@ -140,6 +141,9 @@ MESH_OPTIONS = {
     "pressure": Given(_LOAD, "NAME=P", _number),
     "pressure_slope": Given(_LOAD, "NAME=P", _number),
     "body_force": Given(_LOAD, "[NAME=]fx,fy[,fz]", _numbers),
+    "body_force_slope": Given(_LOAD, "[NAME=]fx,fy[,fz]", _numbers),
+    "force": Given(_LOAD, _PULL, _numbers),
+    "force_slope": Given(_LOAD, _PULL, _numbers),
 }
 
 
@@ -203,6 +207,7 @@ def solve(
     clamp : Part that is held; may be repeated.
     symmetry : Part on a plane of symmetry, or on rollers.
     displacement : Prescribed displacements; `free` for a component that is not prescribed.
+    displacement_slope : The same, times alpha.
     spring : Springs per area, along the normal and along the tangents.
     max_rigid_displacement : Let bodies that only contact holds move as a whole, by at most this length; auto: 10 times
         the mesh's size.
@@ -211,6 +216,9 @@ def solve(
     pressure : Force per area into the body.
     pressure_slope : The same, times alpha.
     body_force : Force per volume, such as the weight, by parts of the body.
+    body_force_slope : The same, times alpha.
+    force : Force on each node of a part or set of nodes, in 2D of the whole thickness.
+    force_slope : The same, times alpha.
     alpha : Parameter value: a number, or a fraction such as 8/3; required if friction or load depend on it.
     output : Write the problem for the other commands: .npz, .h5, or a new directory.
     dry_run : Print what was understood: bodies, parts, loads, contact nodes, rigid modes. Nothing is solved.

@@ -1,4 +1,4 @@
-"""Meshes of bodies from files of mesh generators, read by meshio.
+"""Meshes of bodies from files of mesh generators, read by meshio, and from decks.
 
 By meshio's names of cells it is decided which of a file's cells are the body, and which are its facets.
 """
@@ -18,7 +18,8 @@ import numpy as np
 
 from enumsol.errors import InvalidArgumentError, MissingDependencyError
 from enumsol.fem.cell_blocks import as_cells_have, joined
-from enumsol.fem.file_counts import Deck, deck_of, refuse_partial
+from enumsol.fem.deck_meshes import DeckMesh, deck_mesh
+from enumsol.fem.file_counts import refuse_partial
 from enumsol.fem.meshes import ALL, SAME, PartedMesh, SolidMesh, positions
 from enumsol.model.cells import KINDS, boundary_facets, numbers_of_nodes, padded
 from enumsol.support.arguments import file_path, shown
@@ -28,6 +29,8 @@ from enumsol.support.messages import shortened
 
 if TYPE_CHECKING:
     import meshio
+
+    from enumsol.decks.model import Deck
 
 _PHYSICAL = "gmsh:physical"
 #: What meshio calls the families of a MED file, of cells and of points; numbers of groups in formats without names.
@@ -41,8 +44,8 @@ def read_mesh(source: str | os.PathLike[str] | Any, groups: str | None = None) -
     """Mesh of a body in 2D or 3D with its named parts, from a file that meshio reads or from a meshio.Mesh.
 
     In 2D the cells are triangles and quadrilaterals, of first or of second order (6, 8 or 9 nodes), in 3D tetrahedra,
-    wedges and hexahedra, of first or of second order (10; 18; 20 or 27 nodes), all of them in one mesh where they
-    share whole facets. Hexahedra of 20 nodes are completed to 27, with the last numbers for the
+    wedges and hexahedra, of first or of second order (10; 15 or 18; 20 or 27 nodes), all of them in one mesh where they
+    share whole facets. Wedges of 15 nodes are completed to 18 and hexahedra of 20 to 27, with the last numbers for the
     new nodes. Quadrilaterals and hexahedra (not of 27 nodes) that name nodes twice become the triangles, wedges or
     tetrahedra that they are. The third coordinate of a plane mesh is left out; it must be the same everywhere.
 
@@ -109,6 +112,8 @@ def read_solid(source: str | os.PathLike[str] | Any, groups: str | None = None) 
 
 
 def _read(source: object, groups: str | None, dimension: int | None) -> PartedMesh:
+    if isinstance(source, str | os.PathLike) and Path(source).suffix.lower() == _DECK:
+        return _of_deck(file_path(source, "source"), groups, dimension)
     meshio = MissingDependencyError.imported("meshio", "Meshes in files", "meshes")
     if isinstance(source, meshio.Mesh):
         return _checked(source, groups, dimension, None, "")
@@ -135,8 +140,6 @@ def _by_meshio(meshio: ModuleType, place: Path) -> tuple[meshio.Mesh, str]:
             f"{place}: meshio needs {package} for this format, which is not installed; expected it, or another format"
         ) from error
     except (*DAMAGE, OSError, SystemExit, meshio.ReadError) as error:  # meshio may also exit
-        if place.suffix.lower() == _DECK:
-            _refuse_torn(place)
         reason = "" if isinstance(error, SystemExit) else str(error)
         if isinstance(error, LookupError):  # its text is the key alone
             reason = f"{type(error).__name__}: {reason}"
@@ -146,24 +149,32 @@ def _by_meshio(meshio: ModuleType, place: Path) -> tuple[meshio.Mesh, str]:
         ) from error
 
 
-def _refuse_torn(place: Path) -> None:
-    """Refuse a deck that meshio cannot read if parts of it are lost, and name them."""
+def _of_deck(place: Path, groups: str | None, dimension: int | None) -> PartedMesh:
+    """Mesh of a deck, which has no cell data to group by."""
+    from enumsol.decks.reading import described  # not for other files
+
     try:
-        deck_of(place, None)
-    except InvalidArgumentError:
-        raise
-    except (OSError, ValueError):
-        return  # damaged: meshio has said how
+        return _parted(deck_mesh(described(place, bare=True), spelled=True), groups, dimension)
+    except InvalidArgumentError as error:
+        raise InvalidArgumentError(f"{place}: {error}") from error
+
+
+def mesh_of_deck(deck: Deck) -> PartedMesh:
+    """Mesh of a deck with its named parts, by names in upper case.
+
+    Raises
+    ------
+    InvalidArgumentError
+        As `read_mesh`.
+    """
+    return _parted(deck_mesh(deck), None, None)
 
 
 def _checked(mesh: object, groups: str | None, dimension: int | None, place: Path | None, said: str) -> PartedMesh:
-    deck = None
     try:
-        if place is not None and place.suffix.lower() == _DECK:
-            deck = deck_of(place, mesh)
-        elif place is not None:
+        if place is not None:
             refuse_partial(place, mesh, said)
-        return _parted(mesh, groups, dimension, deck)
+        return _parted(mesh, groups, dimension)
     except InvalidArgumentError:
         raise
     except (IndexError, KeyError, OverflowError, TypeError, ValueError) as error:  # what meshio does not check
@@ -171,14 +182,13 @@ def _checked(mesh: object, groups: str | None, dimension: int | None, place: Pat
         raise InvalidArgumentError(f"the arrays of the mesh do not fit together ({reason})") from error
 
 
-def _parted(mesh: meshio.Mesh, groups: str | None, dimension: int | None, deck: Deck | None) -> PartedMesh:
+def _parted(mesh: meshio.Mesh | DeckMesh, groups: str | None, dimension: int | None) -> PartedMesh:
     kinds = list(dict.fromkeys(block.type for block in mesh.cells))
     if dimension is None:
         spatial = any(kind.startswith(("tetra", "hexa", "wedge", "pyramid", "polyhedron")) for kind in kinds)
         dimension = 3 if spatial else 2
     bodies, sides = body_kinds(kinds, dimension)
-    types = () if deck is None else deck.types(bodies, mesh)
-    labels = None if deck is None else deck.labels(bodies, mesh)
+    types, labels = (tuple(mesh.types), mesh.labels(bodies)) if isinstance(mesh, DeckMesh) else ((), None)
     blocks = [np.asarray(block.data).astype(np.int64) for block in mesh.cells if block.type in bodies]
     used = np.unique(np.concatenate([block.ravel() for block in blocks]))
     if len(used) and not 0 <= used[0] <= used[-1] < len(mesh.points):
@@ -205,7 +215,7 @@ def _parted(mesh: meshio.Mesh, groups: str | None, dimension: int | None, deck: 
     if "quad8" in sides and dimension == 3:
         facets = {name: as_cells_have(rows, inside, name) for name, rows in facets.items()}
     found, sets = facets_of_sets(dimension, inside, sets, int(np.sum(of_file >= 0)))
-    facets = facets or found
+    facets = {**found, **facets} if isinstance(mesh, DeckMesh) else facets or found
     if not facets:
         raise InvalidArgumentError(
             f"the mesh has no contact facets: no {' or '.join(sides)} cells on its boundary; "
@@ -316,7 +326,7 @@ def _families(mesh: object, name: str) -> dict[int, list[str]]:
     return {int(tag): [str(group) for group in members] for tag, members in getattr(mesh, name, {}).items()}
 
 
-#: By dimension: the facets of each kind of cell. Hexahedra with 20 nodes become such with 27.
+#: By dimension: the facets of each kind of cell. Hexahedra with 20 nodes become such with 27, wedges with 15 with 18.
 FACET_OF = {
     d: {
         kind.file_name: list(dict.fromkeys(KINDS[d - 1, len(side)].file_name for side in kind.sides))
@@ -327,6 +337,7 @@ FACET_OF = {
 }
 # collapsed ones have triangles, too
 FACET_OF[3] |= {"hexahedron": ["quad", "triangle"], "hexahedron20": ["quad8", "triangle6"]}
+FACET_OF[3]["wedge15"] = ["triangle6", "quad8"]
 #: By dimension: other cells that files may hold.
 _IGNORED = {2: ("vertex",), 3: ("vertex", "line")}
 _EXPECTED = {d: ", ".join(cells) for d, cells in FACET_OF.items()}

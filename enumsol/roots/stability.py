@@ -91,7 +91,7 @@ def stability(
     Raises
     ------
     InvalidArgumentError
-        There is no mass, friction depends on the solution, or ``root`` is no root of this problem.
+        There is no mass, friction depends on the solution, or ``root`` is no isolated root of this problem.
     InvalidProblemError
         The mass cannot be used.
 
@@ -109,65 +109,25 @@ def stability(
     return asked.of(root)
 
 
-class Stabilities:
-    """Verdicts on roots of one problem; parts that nothing connects are examined by themselves and only once.
+class Equilibria:
+    """Roots of one problem, and the motions that may begin there.
 
-    Parameters
+    Attributes
     ----------
     problem : ContactProblem or ContactProblem3D
-    mass : (n, n) array_like or sparse, or None
-        In place of ``problem.inertia``.
-
-    Raises
-    ------
-    InvalidProblemError
-        The mass cannot be used.
-    InvalidArgumentError
-        There is none, or friction depends on the solution.
+    body : BodyMotions
     """
 
-    def __init__(self, problem: AnyProblem, mass: ArrayLike | sp.sparray | sp.spmatrix | None = None) -> None:
-        self.problem = problem
-        self.body = BodyMotions(problem, mass)
-        self._known: dict[Any, Proven] = {}
+    def __init__(self, problem: AnyProblem, body: BodyMotions) -> None:
+        self.problem, self.body = problem, body
 
     def check(self, root: Root) -> None:
         """Refuse what is no root of this problem."""
         if not hasattr(root, "enclosure"):
-            raise InvalidArgumentError(
-                f"root is {shown(root)}; expected a root of enumerate_roots, not a family of them"
-            )
+            family = "a family of solutions" if hasattr(root, "polytopes") else shown(root)
+            raise InvalidArgumentError(f"root is {family}; expected an isolated root of enumerate_roots")
         if root.problem is not self.problem and root.problem.fingerprint != self.problem.fingerprint:
             raise InvalidArgumentError("root solves another problem; expected one of enumerate_roots(problem, alpha)")
-
-    def of(self, root: Root) -> Stability:
-        """The verdict on one root."""
-        if (reason := self.not_known(root)) is not None:
-            return Stability("undecided", (), (), (), reason)
-        found: list[tuple[float, tuple[float, float], Floats]] = []
-        gaps: list[tuple[float, float]] = []
-        limits = 0
-        for setting, proven in self.examined(root):
-            limits += len(setting.limits)
-            gaps += proven.gaps
-            if not (proven.growing or proven.gaps or everywhere(proven.ranges)):
-                gaps.append((0.0, np.inf))
-            for _, motion in proven.growing:
-                rate = float(np.sqrt(0.5 * sum(motion.mu)))
-                found.append((rate, rate_bounds(*motion.mu), self._shape(setting, motion)))
-        if found:
-            found.sort(key=lambda item: -item[0])
-            rates, bounds, shapes = zip(*found, strict=True)
-            one = f"{len(found)} motions grow" if len(found) > 1 else "a motion grows"
-            return Stability("runs away", rates, shapes, bounds, f"{one} along a straight line")
-        if gaps:
-            low, high = (float(np.sqrt(mu)) for mu in gaps[0])
-            return Stability("undecided", (), (), (), f"growth rates from {low:.3g} to {high:.3g} are not excluded")
-        if not limits:
-            reason = "no contact node is at its limit of friction"
-        else:
-            reason = f"no motion grows with {counted(limits, 'contact node')} at the limit of friction"
-        return Stability("does not run away", (), (), (), reason)
 
     def not_known(self, root: Root) -> str | None:
         """Why the statuses of a root do not tell enough."""
@@ -199,6 +159,64 @@ class Stabilities:
         codes = [frozenset(_CODES[status] for status in statuses) for statuses in active]
         return self.body.settings(codes, F, forces, unsure, every=every)
 
+    @staticmethod
+    def _unsure(root: Root) -> tuple[int, ...]:
+        """Nodes of which bounds alone say what they do, and leave more than one status."""
+        if root.regular or root.exact_slips is not None:
+            return ()
+        return tuple(i for i, statuses in enumerate(root.active) if len(statuses) > 1)
+
+
+class Stabilities(Equilibria):
+    """Verdicts on roots of one problem; parts that nothing connects are examined by themselves and only once.
+
+    Parameters
+    ----------
+    problem : ContactProblem or ContactProblem3D
+    mass : (n, n) array_like or sparse, or None
+        In place of ``problem.inertia``.
+
+    Raises
+    ------
+    InvalidProblemError
+        The mass cannot be used.
+    InvalidArgumentError
+        There is none, or friction depends on the solution.
+    """
+
+    def __init__(self, problem: AnyProblem, mass: ArrayLike | sp.sparray | sp.spmatrix | None = None) -> None:
+        super().__init__(problem, BodyMotions(problem, mass))
+        self._known: dict[Any, Proven] = {}
+
+    def of(self, root: Root) -> Stability:
+        """The verdict on one root."""
+        if (reason := self.not_known(root)) is not None:
+            return Stability("undecided", (), (), (), reason)
+        found: list[tuple[float, tuple[float, float], Floats]] = []
+        gaps: list[tuple[float, float]] = []
+        limits = 0
+        for setting, proven in self.examined(root):
+            limits += len(setting.limits)
+            gaps += proven.gaps
+            if not (proven.growing or proven.gaps or everywhere(proven.ranges)):
+                gaps.append((0.0, np.inf))
+            for _, motion in proven.growing:
+                rate = float(np.sqrt(0.5 * sum(motion.mu)))
+                found.append((rate, rate_bounds(*motion.mu), self._shape(setting, motion)))
+        if found:
+            found.sort(key=lambda item: -item[0])
+            rates, bounds, shapes = zip(*found, strict=True)
+            one = f"{len(found)} motions grow" if len(found) > 1 else "a motion grows"
+            return Stability("runs away", rates, shapes, bounds, f"{one} along a straight line")
+        if gaps:
+            low, high = (float(np.sqrt(mu)) for mu in gaps[0])
+            return Stability("undecided", (), (), (), f"growth rates from {low:.3g} to {high:.3g} are not excluded")
+        if not limits:
+            reason = "no contact node is at its limit of friction"
+        else:
+            reason = f"no motion grows with {counted(limits, 'contact node')} at the limit of friction"
+        return Stability("does not run away", (), (), (), reason)
+
     def examined(self, root: Root) -> Iterator[tuple[Setting, Proven]]:
         """Parts of the body with nodes at their limit, and what is proven of them."""
         for setting in self.settings(root):
@@ -213,13 +231,6 @@ class Stabilities:
         if key not in self._known:
             self._known[key] = StabilitySearch(setting.stiffness, setting.motions).run()
         return self._known[key]
-
-    @staticmethod
-    def _unsure(root: Root) -> tuple[int, ...]:
-        """Nodes of which bounds alone say what they do, and leave more than one status."""
-        if root.regular or root.exact_slips is not None:
-            return ()
-        return tuple(i for i, statuses in enumerate(root.active) if len(statuses) > 1)
 
     def _shape(self, setting: Setting, motion: Motion) -> Floats:
         """Displacements of a motion that grows, (n,), in floats."""

@@ -15,7 +15,7 @@ from enumsol.arithmetic.balls import Ball
 from enumsol.errors import InvalidProblemError
 from enumsol.model.statuses import OPEN, SLIP_MINUS, SLIP_PLUS, STICK
 from enumsol.support.deadlines import look
-from enumsol.trusted.running_away import Crossing, Growing, Motion, Motions
+from enumsol.trusted.running_away import Behaviour, Crossing, Growing, Motion, Motions
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
@@ -60,7 +60,8 @@ class GrowingMotions:
         seen, stack = set[float](), np.array(values)
         for slides, touching in self._candidates(values):
             look()
-            rows = Growing(0.0, 1.0, slides, touching).equations(self.motions)
+            way = Behaviour(slides, touching)
+            rows = way.equations(self.motions)
             if rows is None or not rows[1]:
                 continue
             left, right = rows[0].mid, self.motions.moves.mid[:, rows[1]]
@@ -87,7 +88,7 @@ class GrowingMotions:
                 if at is None or any(abs(at - other) <= 1e-6 * at for other in seen):
                     continue
                 for width in _WIDTHS:
-                    tried = Growing(at * (1 - width), at * (1 + width), slides, touching)
+                    tried = Growing(at * (1 - width), at * (1 + width), way)
                     if floats is not None and tried.found(floats, self.motions) is None:
                         continue
                     found = tried.found(self.stiffness, self.motions)
@@ -119,7 +120,7 @@ class GrowingMotions:
 
     def zero_near(self, known: Growing) -> float | None:
         """About the mu at which a motion grows that grew at another one under slightly other coefficients."""
-        rows, model = known.equations(self.motions), Spectrum.of(self.stiffness)
+        rows, model = known.way.equations(self.motions), Spectrum.of(self.stiffness)
         if rows is None or model is None:
             return 0.5 * (known.low + known.high)
         left, right, signed = rows[0].mid, self.motions.moves.mid[:, rows[1]], self.motions.signed[rows[1]]

@@ -45,8 +45,8 @@ class Setting:
         Its degrees of freedom.
     rows : list of int
         Those rows among all contact rows.
-    limits : list of int
-        Contact nodes at their limit, in the order of ``motions``.
+    limits, touching : lists of int
+        Contact nodes at their limit and those that touch without force, in the order of ``motions``.
     """
 
     stiffness: DynamicStiffness
@@ -54,6 +54,7 @@ class Setting:
     dofs: Integers
     rows: list[int]
     limits: list[int]
+    touching: list[int]
 
 
 class BodyMotions:
@@ -64,6 +65,8 @@ class BodyMotions:
     problem : ContactProblem or ContactProblem3D
     mass : (n, n) array_like or sparse, or None
         In place of ``problem.inertia``.
+    at_rest : bool
+        Only K(0) is asked for, which takes no mass.
 
     Attributes
     ----------
@@ -79,11 +82,16 @@ class BodyMotions:
         There is none, or friction depends on the solution.
     """
 
-    def __init__(self, problem: AnyProblem, mass: ArrayLike | sp.sparray | sp.spmatrix | None = None) -> None:
+    def __init__(
+        self, problem: AnyProblem, mass: ArrayLike | sp.sparray | sp.spmatrix | None = None, *, at_rest: bool = False
+    ) -> None:
         self.problem = problem
         if getattr(problem, "depends_on_solution", False):
             raise InvalidArgumentError("friction depends on the solution; expected constant coefficients")
-        self.mass = problem.inertia if mass is None else checked_mass(mass, problem.A, problem.modes.N)
+        if at_rest:
+            self.mass = sp.csc_array((problem.n, problem.n))
+        else:
+            self.mass = problem.inertia if mass is None else checked_mass(mass, problem.A, problem.modes.N)
         A, rows = sp.csc_array(problem.A), sp.csr_array(problem.contact_rows)
         self.tangents = rows.shape[0] // problem.p - 1
         links = sp.csr_array(abs(A) + abs(self.mass))
@@ -150,7 +158,8 @@ class BodyMotions:
             slopes.append(_column(len(rows), along | {place[i]: -sinking}))
         touching: list[Touching] = []
         signed = [True] * len(moves)
-        for i in (i for i, kind in kinds.items() if kind == "touching"):
+        unloaded = [i for i, kind in kinds.items() if kind == "touching"]
+        for i in unloaded:
             own = [(k + 1) * p + i for k in range(self.tangents) if (k + 1) * p + i in place]
             start = len(columns)
             columns.append(_column(len(rows), {place[i]: Ball.exact(np.array(-1.0))}))
@@ -166,7 +175,7 @@ class BodyMotions:
             tuple(touching),
             tuple(k for k, i in enumerate(moves) if i in unsure),
         )
-        return Setting(self._stiffness_of(part, dofs, rows), motions, dofs, rows, list(moves))
+        return Setting(self._stiffness_of(part, dofs, rows), motions, dofs, rows, list(moves), unloaded)
 
     def _stiffness_of(self, part: int, dofs: Integers, rows: list[int]) -> DynamicStiffness:
         """Stiffness of some rows of a part."""
@@ -217,8 +226,8 @@ def _limit(held: Collection[int], F: list[Ball], i: int, forces: Floats | None) 
         sign = 1.0 if SLIP_PLUS in held else -1.0
         return [Ball.exact(np.array(sign))], F[0][i]
     assert forces is not None
-    inverse = [_inverse(f[i]) for f in F]
-    force = [Ball(0.5 * (low + high), 0.5 * (high - low) * SAFE + TINY) for low, high in forces[i]]
+    inverse = [reciprocal(f[i]) for f in F]
+    force = [hull([Ball.exact(end) for end in ends]) for ends in forces[i]]
     shares = [x * y for x, y in zip(force, inverse, strict=True)]
     length = float(np.hypot(*(x.mid for x in shares))) or TINY
     # |v / |v| - m / |m|| <= 2 |v - m| / |m|
@@ -231,7 +240,7 @@ def _limit(held: Collection[int], F: list[Ball], i: int, forces: Floats | None) 
     return moves, Ball.exact(np.array(typical))
 
 
-def _inverse(F: Ball) -> Ball:
+def reciprocal(F: Ball) -> Ball:
     """1 / F; of no friction at all zero, since no force is along that axis."""
     mid = float(F.mid)
     return (

@@ -333,7 +333,7 @@ def test_warnings_are_lines_without_source_code(capsys, monkeypatch):
 # -- interruption and progress -----------------------------------------------------------------------------------------
 
 
-@pytest.mark.few(1, 1)
+@pytest.mark.few(1, 0)
 @pytest.mark.parametrize(
     "options",
     [
