@@ -1,4 +1,4 @@
-"""A plane body on a rigid foundation: stiffness by scikit-fem, loads, and the ContactProblem.
+"""A plane body on a rigid foundation: stiffness, loads, and the ContactProblem.
 
 Cells are triangles or quadrilaterals of first or second order, with 3, 6, 4, 8 or 9 nodes in the order of VTK, or both
 as in `PartedMesh`. Degrees of freedom before constraints are ``2 node + component``. A problem is put together from
@@ -45,7 +45,7 @@ if TYPE_CHECKING:
 
 
 def stiffness(points: ArrayLike, cells: ArrayLike, lame: tuple[float, float]) -> sp.csc_array:
-    """Stiffness of the unconstrained body in plane strain, (2N, 2N), assembled by scikit-fem.
+    """Stiffness of the unconstrained body in plane strain, (2N, 2N).
 
     Parameters
     ----------

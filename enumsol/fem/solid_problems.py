@@ -1,6 +1,6 @@
 """From a mesh of a body in 3D to its contact problem (theory, section 11.6).
 
-Bodies of P1 tetrahedra or Q1 hexahedra: their stiffness by scikit-fem, body forces and tractions; the contact surface,
+Bodies of P1 tetrahedra or Q1 hexahedra: their stiffness, body forces and tractions; the contact surface,
 where multipliers live, local axes and the return operator r_h. Degrees of freedom before constraints are
 ``3 node + component``.
 """
