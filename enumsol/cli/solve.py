@@ -70,7 +70,7 @@ def _as_given(text: str, option: str) -> str:
 
 
 def _entry(part: str, option: str, text: str) -> Any:
-    if part.strip() == "free" and option == "--displacement":
+    if part.strip() == "free" and option.startswith("--displacement"):
         return "free"
     try:
         return float(part)
@@ -133,6 +133,7 @@ MESH_OPTIONS = {
     "clamp": Given(_SUPPORT, "NAME", _as_given),
     "symmetry": Given(_SUPPORT, "NAME", _as_given),
     "displacement": Given(_SUPPORT, "NAME=ux,uy[,uz]", _numbers),
+    "displacement_slope": Given(_SUPPORT, "NAME=ux,uy[,uz]", _numbers),
     "spring": Given(_SUPPORT, "NAME=kn,kt", _numbers),
     "max_rigid_displacement": Given(_SUPPORT, "LENGTH|auto", _auto_or_number, False),
     "load": Given(_LOAD, _PULL, _numbers),
@@ -206,6 +207,7 @@ def solve(
     clamp : Part that is held; may be repeated.
     symmetry : Part on a plane of symmetry, or on rollers.
     displacement : Prescribed displacements; `free` for a component that is not prescribed.
+    displacement_slope : The same, times alpha.
     spring : Springs per area, along the normal and along the tangents.
     max_rigid_displacement : Let bodies that only contact holds move as a whole, by at most this length; auto: 10 times
         the mesh's size.

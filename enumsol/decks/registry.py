@@ -5,6 +5,7 @@ A new card is a function with `@card(...)` in one of the modules whose names end
 
 from __future__ import annotations
 
+import difflib
 from collections.abc import Callable, Collection
 from dataclasses import dataclass, field
 
@@ -64,7 +65,8 @@ class Reading:
             It is not known, or not as expected.
         """
         name = compact(card.name)
-        if self.bare and not (name in CARDS and CARDS[name].of_mesh):
+        close = [] if name in CARDS or name in HARMLESS else difflib.get_close_matches(name, CARDS, n=1, cutoff=0.8)
+        if self.bare and not any(CARDS[own].of_mesh for own in (name, *close) if own in CARDS):
             return
         if name in self.ignore:
             self.account(card, "not used, as you say", used=False)
@@ -79,7 +81,7 @@ class Reading:
             self.account(card, f"not used: {HARMLESS[name]}", used=False)
         else:
             raise card.refused(
-                f"is not read, and may change the answer; expected other cards, or "
+                f"is not read, and may change the answer; expected {f'*{close[0]}' if close else 'other cards'}, or "
                 f'--ignore {card.name.replace(" ", "")} (in Python ignore=["..."]) to do without it'
             )
 

@@ -290,7 +290,7 @@ def _alone(scene: Scene) -> list[str]:
 
 def _rest(scene: Scene) -> list[str]:
     """Nothing that acts on the bodies."""
-    acting = np.any(scene.forces) or np.any(scene.slope) or np.any(scene.held.values)
+    acting = np.any(scene.forces) or np.any(scene.slope) or np.any(scene.held.values) or np.any(scene.held.slopes)
     if acting or np.any(scene.gaps < 0):
         return []
     return ["nothing acts on the body: it has no load, press fit or given displacement, and rests"]

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any, Protocol
 from xml.etree import ElementTree
 
 import numpy as np
+import scipy.sparse as sp
 
 from enumsol.errors import InvalidArgumentError, MissingDependencyError
 from enumsol.model.cells import KINDS, by_kind
@@ -277,7 +278,8 @@ def _body(meshio: ModuleType, problem: ContactProblem3D, mesh: BodyMesh, u: Floa
 def _nodes(problem: ContactProblem3D, mesh: BodyMesh) -> Integers:
     """The node that each contact row stands for."""
     rows = problem.contact_rows
-    nodes = mesh.dofs[rows.indices] // 3
+    rows = sp.csr_array(rows @ mesh.acting.T)
+    nodes = rows.indices // 3
     first = nodes[rows.indptr[:-1]]
     by_direction = first.reshape(3, problem.p)
     if np.any(nodes != np.repeat(first, np.diff(rows.indptr))) or np.any(by_direction != by_direction[0]):
