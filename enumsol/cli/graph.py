@@ -62,8 +62,8 @@ def graph(
     ----------
     arithmetic : verified: rigorous error bounds, with proof. fast: the search trusts floats, never proven. exact:
         rationals throughout, with proof, slow beyond ten contact nodes.
-    stability : Say which arcs run away, however long it takes; by default in 2D, where PROBLEM has a mesh or a mass, if
-        that takes less than about a tenth of the work on the graph.
+    stability : Say which arcs run away, however long it takes; by default where PROBLEM has a mesh or a mass, if that
+        takes less than about a tenth of the work on the graph.
     save_file : Write the graph, for enumsol audit and follow.
     csv_file : Write a table with one row per arc; - is stdout.
     proof_file : Write the proof (verified), for enumsol verify.
@@ -194,9 +194,9 @@ def build(
         return branch_graph(problem, interval, arithmetic, progress=display, executor=executor, **limits)
 
 
-#: Work on verdicts that nobody asked for, as a share of the work on the graph. Both are counted, so that no result
-#: depends on the machine: an arc on which a node slides takes about as long as so many nodes of the tree, where
-#: friction is constant, and where it changes (the runs of `studies/stability`); with larger ones less is said.
+#: Work on verdicts that nobody asked for, as a share of the work on the graph, both counted, so that no result depends
+#: on the machine: an arc on which a node slides takes about as long as so many nodes of the tree, where friction and
+#: directions are constant, and where they change (bodies of the gallery); with larger numbers less is said unasked.
 _SHARE, _NODES_OF_AN_ARC = 0.1, (300, 5000)
 
 
@@ -225,16 +225,16 @@ def _told(
 def _work(problem: AnyProblem, found: BranchGraph) -> int:
     """An estimate of the work on verdicts, in nodes of the tree."""
     sliding = [arc for arc in found.arcs if any(status.value.startswith("slip") for status in arc.statuses)]
-    if any(problem.affine_friction[1]):
+    slopes = problem.affine_friction[1]
+    # in 3D directions of slip change along an arc
+    if slopes.ndim > 1 or slopes.any():
         return _NODES_OF_AN_ARC[1] * len(sliding)
     return _NODES_OF_AN_ARC[0] * len({arc.statuses for arc in sliding})
 
 
 def _has_mass(problem: AnyProblem) -> bool:
     """True if verdicts on arcs can be found without more data."""
-    from enumsol.model.problem import ContactProblem  # numpy: not for --help
-
-    return isinstance(problem, ContactProblem) and (problem.mass is not None or problem.mesh is not None)
+    return problem.mass is not None or problem.mesh is not None
 
 
 def read_graph(file: str, problem: AnyProblem) -> BranchGraph:

@@ -6,12 +6,13 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from enumsol.decks.cards import Place, key
-from enumsol.decks.model import Account, Deck, Members, Region, Surface
+from enumsol.decks.cards import DeckPlace, key
+from enumsol.decks.faces import named_faces
+from enumsol.decks.model import Account, Deck, DeckRegion, Members, Surface
 from enumsol.decks.registry import Reading
 from enumsol.errors import InvalidArgumentError
 from enumsol.support.array_types import Floats, Integers, Mask
-from enumsol.support.messages import counted
+from enumsol.support.messages import counted, listed
 
 _NONE = np.zeros(0, dtype=np.int64)
 
@@ -25,20 +26,26 @@ def put_together(reading: Reading) -> Deck:
         A number is given twice, a node or a set is not given, a set contains itself, or a face is none.
     """
     deck = reading.deck
+    if open_ := reading.part or reading.instance:
+        what = "PART" if reading.part else "INSTANCE"
+        raise InvalidArgumentError(f"{reading.region.place}: {open_} does not end; expected *END {what}")
+    for part in reading.parts.values():
+        if not part.is_used and part.place is not None:
+            said = f"part {part.spelled} not used: there is no *INSTANCE of it"
+            deck.account.append(Account(part.place, "PART", said, used=False))
     whole = _Whole(deck)
     for instance, region in (("", reading.top), *reading.instances.items()):
         whole.add(instance, region)
     deck.points = np.concatenate([np.zeros((0, 3)), *whole.points])
     deck.node_labels = np.concatenate([_NONE, *whole.labels])
-    for (kind, name), (members, _) in whole.sets.items():
+    for (kind, name), (members, instance) in whole.sets.items():
         if kind == "SURFACE":
             deck.surfaces[name] = whole.surface(name, members)
         else:
             rows = np.unique(whole.rows(kind, name))
             (deck.node_sets if kind == "NSET" else deck.element_sets)[name] = rows
-        deck.spelled.setdefault(
-            name, members.spelled if "." not in name else name.rsplit(".", 1)[0] + "." + members.spelled
-        )
+        before = f"{reading.instances[instance].spelled}." if instance else ""
+        deck.spelled.setdefault(name, before + members.spelled)
     return deck
 
 
@@ -81,7 +88,7 @@ class _Whole:
         self.known: dict[tuple[str, str], Integers] = {}
         self.nodes = self.elements = 0
 
-    def add(self, instance: str, region: Region) -> None:
+    def add(self, instance: str, region: DeckRegion) -> None:
         """Add the nodes, elements and sets of a region."""
         labels, points = _distinct_nodes(region)
         numbers = self.numbers["NSET", instance] = _Numbers.of(labels, self.nodes)
@@ -126,7 +133,7 @@ class _Whole:
         return self.known[kind, name]
 
     def _part(
-        self, members: Members, part: tuple[str, Integers | range | str, str, Place], instance: str, kind: str,
+        self, members: Members, part: tuple[str, Integers | range | str, str, DeckPlace], instance: str, kind: str,
         above: tuple[str, ...],
     ) -> Integers:  # fmt: skip
         """Rows of one part of a set, of nodes of elements if it is a set of these."""
@@ -146,12 +153,13 @@ class _Whole:
         if len(rows) < wanted:
             words = "nodes" if of == "NSET" else "elements"
             lost = counted(wanted - len(rows), "number")
-            self.deck.account.append(
-                Account(place, kind, f"set {members.spelled}: {lost} not used: there are no such {words}", used=False)
-            )
+            if not isinstance(what, range | str):
+                lost = listed(what[~there].tolist())
+            said = f"set {members.spelled}: {lost} not used: there are no such {words}"
+            self.deck.account.append(Account(place, kind, said, used=False))
         return self._nodes(rows) if of != kind else rows
 
-    def _named(self, kind: str, what: str, instance: str, place: Place, above: tuple[str, ...]) -> Integers:
+    def _named(self, kind: str, what: str, instance: str, place: DeckPlace, above: tuple[str, ...]) -> Integers:
         """Rows of a set, or of a number of an instance, by name."""
         name = key(what)
         for each in (f"{instance}.{name}", name) if instance else (name,):
@@ -183,11 +191,11 @@ class _Whole:
         faces = [np.zeros((0, 2), dtype=np.int64)]
         for part in members.parts:
             rows = np.unique(self._part(members, ("ELSET", *part[1:]), instance, "ELSET", ()))
-            faces.append(_faces(self.deck, rows, part[0], part[3]))
+            faces.append(named_faces(self.deck, rows, part[0], part[3]))
         return Surface(members.place, np.unique(np.concatenate(faces), axis=0))
 
 
-def _distinct_nodes(region: Region) -> tuple[Integers, Floats]:
+def _distinct_nodes(region: DeckRegion) -> tuple[Integers, Floats]:
     """Numbers and positions of the nodes of a region; a node that is given again has to be where it was."""
     labels = np.concatenate([_NONE, *(own for _, own, _ in region.nodes)])
     points = np.concatenate([np.zeros((0, 3)), *(own for _, _, own in region.nodes)])
@@ -205,7 +213,7 @@ def _distinct_nodes(region: Region) -> tuple[Integers, Floats]:
     return labels, points
 
 
-def _check_distinct(labels: Integers, region: Region) -> None:
+def _check_distinct(labels: Integers, region: DeckRegion) -> None:
     """Refuse elements of one number."""
     kept, first = np.unique(labels, return_index=True)
     if len(kept) < len(labels):
@@ -213,56 +221,3 @@ def _check_distinct(labels: Integers, region: Region) -> None:
         ends = np.cumsum([len(block.labels) for block in region.blocks])
         place = region.blocks[int(np.searchsorted(ends, again, side="right"))].place
         raise InvalidArgumentError(f"{place}: element {labels[again]} is given twice; expected every element once")
-
-
-def _faces(deck: Deck, elements: Integers, label: str, place: Place) -> Integers:
-    """Faces (k, 2) of elements: their rows and the numbers of their faces from 0, or -1 for the element itself."""
-    found, first = [np.zeros((0, 2), dtype=np.int64)], 0
-    for block in deck.blocks:
-        own = elements[(elements >= first) & (elements < first + len(block.labels))]
-        first += len(block.labels)
-        if not len(own):
-            continue
-        faces = block.type.shape.faces if block.type.is_body else ()
-        if not label and faces:
-            free = free_faces(deck)
-            found.append(free[np.isin(free[:, 0], own)])
-            continue
-        if not block.type.is_body and block.type.shape.dimension and label in ("", "SPOS", "SNEG", "S1", "S2"):
-            number = -1
-        elif label[:1] == "S" and label[1:].isdigit() and 1 <= int(label[1:]) <= len(faces):
-            number = int(label[1:]) - 1
-        else:
-            expected = f"S1 to S{len(faces)}" if faces else "SPOS or SNEG"
-            raise InvalidArgumentError(
-                f"{place}: *SURFACE names the face {label or 'of no name'} of elements of type {block.type.name}; "
-                f"expected {expected}"
-            )
-        found.append(np.column_stack([own, np.full(len(own), number)]))
-    return np.concatenate(found)
-
-
-def corners_of(faces: Integers) -> Integers:
-    """Corners (k, 4) of faces in ascending order, each once, behind -1 where there are fewer: the same for one face."""
-    sorted_ = np.sort(faces, axis=1)
-    sorted_[:, 1:][sorted_[:, 1:] == sorted_[:, :-1]] = -1
-    wide = np.full((len(faces), 4), -1, dtype=np.int64)
-    wide[:, 4 - faces.shape[1] :] = np.sort(sorted_, axis=1)
-    return wide
-
-
-def free_faces(deck: Deck) -> Integers:
-    """Faces (k, 2) of bodies that belong to no other element, as in `Surface`."""
-    keys, faces, first = [np.zeros((0, 4), dtype=np.int64)], [np.zeros((0, 2), dtype=np.int64)], 0
-    for block in deck.blocks:
-        shape = block.type.shape
-        for number, nodes in enumerate(shape.faces if block.type.is_body else ()):
-            corners = [node for node in nodes if node < shape.corners]
-            keys.append(corners_of(block.nodes[:, corners]))
-            faces.append(np.column_stack([first + np.arange(len(block.labels)), np.full(len(block.labels), number)]))
-        first += len(block.labels)
-    every, of = np.concatenate(keys), np.concatenate(faces)
-    least = np.max([block.type.shape.dimension for block in deck.blocks if block.type.is_body], initial=2)
-    whole = np.sum(every >= 0, axis=1) >= least  # a side of a collapsed element may be a line or a point
-    _, first_of, count = np.unique(every[whole], axis=0, return_index=True, return_counts=True)
-    return np.asarray(of[whole][np.sort(first_of[count == 1])])

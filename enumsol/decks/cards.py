@@ -19,7 +19,7 @@ from enumsol.errors import InvalidArgumentError
 from enumsol.support.array_types import Floats, Integers, NDArray
 from enumsol.support.deadlines import look, tell
 from enumsol.support.files import unreadable
-from enumsol.support.messages import shortened, visible
+from enumsol.support.messages import counted, shortened, visible
 
 #: Bytes of all files of a deck together: larger ones need several times as much memory when they are read.
 MOST_BYTES = 1_000_000_000
@@ -35,7 +35,7 @@ _OF_NUMBERS = frozenset("0123456789+-.eE, \t")
 
 
 @dataclass(frozen=True, order=True)
-class Place:
+class DeckPlace:
     """A line of a deck, as in "model.inp line 812"."""
 
     file: str
@@ -55,23 +55,23 @@ class Card:
         In upper case with single blanks, as in "SOLID SECTION".
     options : dict
         What stands behind the name: names in upper case, values as written; "" for an option without a value.
-    place : Place
+    place : DeckPlace
     data : list of str
         Lines of data without comments and empty lines, and without blanks at their ends.
-    runs : list of (int, Place)
+    runs : list of (int, DeckPlace)
         Places of the rows of data behind which others follow line by line.
     """
 
     name: str
     options: dict[str, str]
-    place: Place
+    place: DeckPlace
     data: list[str] = field(default_factory=list)
-    runs: list[tuple[int, Place]] = field(default_factory=list)
+    runs: list[tuple[int, DeckPlace]] = field(default_factory=list)
 
-    def at(self, row: int) -> Place:
-        """Place of a row of the data."""
+    def at(self, row: int) -> DeckPlace:
+        """DeckPlace of a row of the data."""
         first, place = self.runs[bisect_right(self.runs, row, key=lambda run: run[0]) - 1]
-        return Place(place.file, place.line + row - first)
+        return DeckPlace(place.file, place.line + row - first)
 
     def refused(self, found: str, row: int | None = None) -> InvalidArgumentError:
         """Error about the card, or about a row of its data: its place, its name and what is wrong with it."""
@@ -90,7 +90,7 @@ class Card:
             The option is missing.
         """
         if not (named := self.name_of(option)):
-            raise self.refused(f"has no {option}; expected {option}=...")
+            raise self.refused(f"has no {option}; expected {option}=NAME")
         return named
 
     def entries(self, row: int) -> list[str]:
@@ -143,7 +143,7 @@ class Card:
         entries = self.entries(row)
         if len(entries) < least or (most is not None and len(entries) > most):
             expected = f"{least}" if most == least else f"{least} to {most}" if most is not None else f"{least} or more"
-            raise self.refused(f"has {len(entries)} numbers in a line; expected {expected}", row)
+            raise self.refused(f"has {counted(len(entries), 'number')} in a line; expected {expected}", row)
         return [self.number(entry, row) for entry in entries]
 
     def table(self, columns: int) -> Floats:
@@ -185,7 +185,7 @@ class Card:
                 stop = min(int(np.searchsorted(ends, lacking[0])), len(lines) - 1)
                 count = int(ends[stop] - (ends[row - 1] if row else 0))
                 expected = f"expected {width}, its own and those of its nodes"
-                raise self.refused(f"has {count} numbers for one element; {expected}", row)
+                raise self.refused(f"has {counted(count, 'number')} for one element; {expected}", row)
         values = _numbers_of(lines, int)
         if values is None:
             every = [self.integer(entry.strip(), row) for row, text in enumerate(lines) for entry in text.split(",")]
@@ -249,20 +249,18 @@ class _Source:
         starred = [k for k, line in enumerate(lines) if line.lstrip()[:1] == "*"]
         self._add_data(path, lines, 0, starred[0] if starred else len(lines))
         begin = 0
-        for count, (k, following) in enumerate(zip(starred, [*starred[1:], len(lines)], strict=True)):
+        for count, k in enumerate(starred):
             if count % 1_000 == 0:
                 look()
                 tell(f"lines of {path.name}", k, len(lines))
-            if k < begin:
-                continue  # a comment among options
             text = lines[k].strip()
-            begin = k + 1
-            if not text.startswith("**"):
-                text, begin = _whole(lines, text, begin)
-                self._begin(Place(path.name, k + 1), path, text, above)
-            self._add_data(path, lines, begin, following)
+            if k >= begin and not text.startswith("**"):
+                text, begin = _whole(lines, text, k + 1)
+                self._begin(DeckPlace(path.name, k + 1), path, text, above)
+            begin = max(begin, k + 1)
+            self._add_data(path, lines, begin, starred[count + 1] if count + 1 < len(starred) else len(lines))
 
-    def _begin(self, place: Place, path: Path, text: str, above: tuple[Path, ...]) -> None:
+    def _begin(self, place: DeckPlace, path: Path, text: str, above: tuple[Path, ...]) -> None:
         word, *pairs = text[1:].split(",")
         options = {}
         for pair in pairs:
@@ -270,16 +268,17 @@ class _Source:
             if name.strip():
                 options[" ".join(name.upper().split())] = value.strip()
         card = Card(" ".join(word.upper().split()), options, place)
-        if card.name == "INCLUDE":
-            self.read(self._included(card, path, above), above)
-        else:
+        if card.name != "INCLUDE":
             self.cards.append(card)
+        if card.name == "INCLUDE" or options.get("INPUT"):  # cards of Abaqus may have their data in a file
+            self.read(self._included(card, path, above), above)
+            options.pop("INPUT")
 
     def _included(self, card: Card, path: Path, above: tuple[Path, ...]) -> Path:
         """File that a card includes."""
         name = card.options.get("INPUT", "").strip("\"'").replace("\\", "/")
         if not name:
-            raise card.refused("names no file; expected INPUT=...")
+            raise card.refused("names no file; expected INPUT=FILE")
         folder = self.path.parent.resolve()
         places = [(base / name).resolve() for base in (path.parent, self.path.parent)]
         place = next((each for each in places if each.exists()), places[0])
@@ -302,14 +301,15 @@ class _Source:
         if not filled:
             return
         if not self.cards:
+            place = DeckPlace(path.name, begin + filled[0] + 1)
             raise InvalidArgumentError(
-                f"{Place(path.name, begin + filled[0] + 1)}: {shown(stripped[filled[0]])} is no keyword; expected a "
+                f"{place}: {shown(stripped[filled[0]])} is no keyword; expected a "
                 "deck of CalculiX or Abaqus, which begins with one, such as *NODE"
             )
         card, last = self.cards[-1], -2
         for count, k in enumerate(filled):
             if k != last + 1:
-                card.runs.append((len(card.data) + count, Place(path.name, begin + k + 1)))
+                card.runs.append((len(card.data) + count, DeckPlace(path.name, begin + k + 1)))
             last = k
         card.data += [stripped[k] for k in filled]
 

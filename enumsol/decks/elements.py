@@ -28,33 +28,36 @@ class Shape:
     faces: tuple[tuple[int, ...], ...] = ()
     to_vtk: tuple[int, ...] = ()
 
+    @property
+    def form(self) -> str:
+        """Name of the shape of first order."""
+        return self.name.rstrip("0123456789")
+
 
 _TETRAHEDRON = ((0, 1, 2), (0, 3, 1), (1, 3, 2), (2, 3, 0))
 _WEDGE = ((0, 1, 2), (3, 5, 4), (0, 3, 4, 1), (1, 4, 5, 2), (2, 5, 3, 0))
 _PYRAMID = ((0, 1, 2, 3), (0, 4, 1), (1, 4, 2), (2, 4, 3), (3, 4, 0))
 _HEXAHEDRON = ((0, 1, 2, 3), (4, 7, 6, 5), (0, 4, 5, 1), (1, 5, 6, 2), (2, 6, 7, 3), (3, 7, 4, 0))
 #: Corners between which the nodes behind the corners lie.
-_EDGES = {
-    4: ((0, 1), (1, 2), (2, 0), (0, 3), (1, 3), (2, 3)),
-    5: ((0, 1), (1, 2), (2, 3), (3, 0), (0, 4), (1, 4), (2, 4), (3, 4)),
-    6: ((0, 1), (1, 2), (2, 0), (3, 4), (4, 5), (5, 3), (0, 3), (1, 4), (2, 5)),
-    8: (*((k, (k + 1) % 4) for k in range(4)), *((4 + k, 4 + (k + 1) % 4) for k in range(4)),
-        *((k, 4 + k) for k in range(4))),
-}  # fmt: skip
+EDGES = {
+    "triangle": ((0, 1), (1, 2), (2, 0)),
+    "quad": ((0, 1), (1, 2), (2, 3), (3, 0)),
+    "tetra": ((0, 1), (1, 2), (2, 0), (0, 3), (1, 3), (2, 3)),
+    "pyramid": ((0, 1), (1, 2), (2, 3), (3, 0), (0, 4), (1, 4), (2, 4), (3, 4)),
+    "wedge": ((0, 1), (1, 2), (2, 0), (3, 4), (4, 5), (5, 3), (0, 3), (1, 4), (2, 5)),
+    "hexahedron": (
+        *((0, 1), (1, 2), (2, 3), (3, 0), (4, 5), (5, 6), (6, 7), (7, 4)),
+        *((0, 4), (1, 5), (2, 6), (3, 7)),
+    ),
+}
 
 
-def _faces(faces: tuple[tuple[int, ...], ...], *, inside: bool = False) -> tuple[tuple[int, ...], ...]:
+def _faces(name: str, faces: tuple[tuple[int, ...], ...], *, inside: bool = False) -> tuple[tuple[int, ...], ...]:
     """Faces of second order, from their corners."""
     corners = max(node for face in faces for node in face) + 1
-    between = {frozenset(edge): corners + k for k, edge in enumerate(_EDGES[corners])}
-    return tuple(
-        (
-            *face,
-            *(between[frozenset(edge)] for edge in pairwise((*face, face[0]))),
-            *((21 + k,) if inside else ()),
-        )
-        for k, face in enumerate(faces)
-    )
+    between = {frozenset(edge): corners + k for k, edge in enumerate(EDGES[name])}
+    found = [(*face, *(between[frozenset(edge)] for edge in pairwise((*face, face[0])))) for face in faces]
+    return tuple((*face, 21 + k) if inside else face for k, face in enumerate(found))
 
 
 def _sides(corners: int, *, second: bool) -> tuple[tuple[int, ...], ...]:
@@ -74,14 +77,21 @@ _SHAPES = {
         Shape("quad8", 2, 8, 4, _sides(4, second=True)),
         Shape("quad9", 2, 9, 4, _sides(4, second=True)),
         Shape("tetra", 3, 4, 4, _TETRAHEDRON),
-        Shape("tetra10", 3, 10, 4, _faces(_TETRAHEDRON)),
+        Shape("tetra10", 3, 10, 4, _faces("tetra", _TETRAHEDRON)),
         Shape("pyramid", 3, 5, 5, _PYRAMID),
-        Shape("pyramid13", 3, 13, 5, _faces(_PYRAMID)),
+        Shape("pyramid13", 3, 13, 5, _faces("pyramid", _PYRAMID)),
         Shape("wedge", 3, 6, 6, _WEDGE),
-        Shape("wedge15", 3, 15, 6, _faces(_WEDGE)),
+        Shape("wedge15", 3, 15, 6, _faces("wedge", _WEDGE)),
         Shape("hexahedron", 3, 8, 8, _HEXAHEDRON),
-        Shape("hexahedron20", 3, 20, 8, _faces(_HEXAHEDRON)),
-        Shape("hexahedron27", 3, 27, 8, _faces(_HEXAHEDRON, inside=True), (*range(20), 26, 24, 23, 25, 21, 22, 20)),
+        Shape("hexahedron20", 3, 20, 8, _faces("hexahedron", _HEXAHEDRON)),
+        Shape(
+            "hexahedron27",
+            3,
+            27,
+            8,
+            _faces("hexahedron", _HEXAHEDRON, inside=True),
+            (*range(20), 26, 24, 23, 25, 21, 22, 20),
+        ),
     )
 }
 
@@ -93,7 +103,7 @@ def shape_of(dimension: int, nodes: int) -> Shape | None:
 
 @dataclass(frozen=True)
 class ElementType:
-    """What a type of elements says.
+    """A type of elements, and what its letters say.
 
     Attributes
     ----------
@@ -126,17 +136,18 @@ _FAMILIES = {
     "R3D": ("rigid surfaces", 2), "R2D": ("rigid lines", 1), "RAX": ("rigid lines", 1), "SAX": ("shells", 1),
     "MAX": ("membranes", 1), "T2D": ("trusses", 1), "T3D": ("trusses", 1),
 }  # fmt: skip
-#: Types whose names hold no number of nodes: family, dimension, nodes.
+#: Types whose names hold no number of nodes: family, dimension, nodes (B33H as meshio writes it).
 _OTHERS = {
     "B21": ("beams", 1, 2), "B22": ("beams", 1, 3), "B31": ("beams", 1, 2), "B32": ("beams", 1, 3),
-    "B23": ("beams", 1, 2), "B33": ("beams", 1, 2), "STRI65": ("shells", 2, 6), "MASS": ("point masses", 0, 1),
-    "SPRING1": ("springs", 0, 1), "SPRING2": ("springs", 1, 2), "SPRINGA": ("springs", 1, 2),
-    "DASHPOT1": ("dashpots", 0, 1), "DASHPOT2": ("dashpots", 1, 2), "DASHPOTA": ("dashpots", 1, 2),
-    "GAPUNI": ("gap elements", 1, 2), "DCOUP3D": ("couplings", 0, 1), "ROTARYI": ("point masses", 0, 1),
+    "B23": ("beams", 1, 2), "B33": ("beams", 1, 2), "B33H": ("beams", 1, 3), "STRI65": ("shells", 2, 6),
+    "MASS": ("point masses", 0, 1), "SPRING1": ("springs", 0, 1), "SPRING2": ("springs", 1, 2),
+    "SPRINGA": ("springs", 1, 2), "DASHPOT1": ("dashpots", 0, 1), "DASHPOT2": ("dashpots", 1, 2),
+    "DASHPOTA": ("dashpots", 1, 2), "GAPUNI": ("gap elements", 1, 2), "DCOUP3D": ("couplings", 0, 1),
+    "ROTARYI": ("point masses", 0, 1),
 }  # fmt: skip
-#: Letters behind the number of nodes that change the formulation only: reduced integration, incompatible modes, hybrid,
-#: modified, improved bending or surface.
-_LETTERS = re.compile(r"([A-Z][A-Z0-9]*?D|[A-Z]+)(\d+)([RIHMSL]*)\Z")
+#: Letters behind the number of nodes change the formulation: reduced integration, incompatible modes, hybrid, modified,
+#: with pressure or temperature as unknowns, and others.
+_LETTERS = re.compile(r"([A-Z][A-Z0-9]*?D|[A-Z]+)(\d+)(R5|[RIHMSLPTW]*)\Z")
 
 
 @lru_cache(maxsize=256)
@@ -150,11 +161,9 @@ def element_type(name: str) -> ElementType | None:
     >>> kind.family, kind.shape.nodes, kind.plain
     ('solid', 20, 'C3D20')
     """
-    whole = name.rstrip("RH") if name.rstrip("RHS") in _OTHERS else name
-    if (other := _OTHERS.get(name.rstrip("RHS") if whole != name else name)) is not None:
-        family, dimension, nodes = other
-        shape = shape_of(dimension, nodes)
-        return None if shape is None else ElementType(name, family, shape, name)
+    if (plain := name if name in _OTHERS else name.rstrip("RHS")) in _OTHERS:
+        family, dimension, nodes = _OTHERS[plain]
+        return ElementType(name, family, _SHAPES[dimension, nodes], plain)
     found = _LETTERS.match(name)
     if found is None or found.group(1) not in _FAMILIES:
         return None
@@ -163,6 +172,6 @@ def element_type(name: str) -> ElementType | None:
     if found.group(1) in ("SAX", "MAX"):
         nodes += 1  # the number is that of the order
     shape = shape_of(dimension, nodes)
-    if shape is None or (found.group(1) in ("S", "STRI") and nodes == 5):
+    if shape is None:
         return None
     return ElementType(name, family, shape, f"{found.group(1)}{found.group(2)}")

@@ -8,6 +8,7 @@ from enumsol.decks.cards import Card
 from enumsol.decks.model import Material, Orientation, Section
 from enumsol.decks.registry import Reading, card
 from enumsol.support.array_types import Floats
+from enumsol.support.messages import counted
 
 #: Constants of the kinds of *ELASTIC.
 _CONSTANTS = {"ISO": 2, "ORTHO": 9, "ENGINEERING CONSTANTS": 9}
@@ -75,12 +76,12 @@ def _constants(given: Card, count: int) -> Floats:
     """Constants of a law that is given at one temperature, or at several where it is the same."""
     lines = -(-count // _WIDTH)
     if not given.data or len(given.data) % lines:
-        raise given.refused(f"has {len(given.data)} lines of data; expected {count} numbers")
+        raise given.refused(f"has {counted(len(given.data), 'line')} of data; expected {count} numbers")
     tables = []
     for first in range(0, len(given.data), lines):
         entries = [value for row in range(first, first + lines) for value in given.numbers(row)]
         if not count <= len(entries) <= count + 1:
-            raise given.refused(f"has {len(entries)} numbers; expected {count}, and a temperature", first)
+            raise given.refused(f"has {counted(len(entries), 'number')}; expected {count}, and a temperature", first)
         tables.append(entries[:count])
     if np.any(np.array(tables) != tables[0]):
         raise given.refused(
@@ -89,7 +90,7 @@ def _constants(given: Card, count: int) -> Floats:
     return np.array(tables[0])
 
 
-@card("SOLID SECTION", "ELSET", "MATERIAL", "ORIENTATION", "CONTROLS")
+@card("SOLID SECTION", "ELSET", "MATERIAL", "ORIENTATION", "CONTROLS", of_mesh=True)
 def solid_section(reading: Reading, given: Card) -> str:
     """*SOLID SECTION: the material of a set of elements, and the thickness of plane ones."""
     elements, of = given.needed("ELSET"), given.needed("MATERIAL")
@@ -102,10 +103,10 @@ def solid_section(reading: Reading, given: Card) -> str:
     return f"elements of {elements} are of {of}" + (f", {value:g} thick" if value is not None else "")
 
 
-@card("SHELL SECTION", "ELSET", "MATERIAL", "ORIENTATION", "OFFSET", "NODAL THICKNESS", "COMPOSITE")
-@card("MEMBRANE SECTION", "ELSET", "MATERIAL", "ORIENTATION", "OFFSET", "NODAL THICKNESS")
-@card("BEAM SECTION", "ELSET", "MATERIAL", "SECTION", "ORIENTATION", "OFFSET1", "OFFSET2")
-@card("SURFACE SECTION", "ELSET", "DENSITY")
+@card("SHELL SECTION", "ELSET", "MATERIAL", "ORIENTATION", "OFFSET", "NODAL THICKNESS", "COMPOSITE", of_mesh=True)
+@card("MEMBRANE SECTION", "ELSET", "MATERIAL", "ORIENTATION", "OFFSET", "NODAL THICKNESS", of_mesh=True)
+@card("BEAM SECTION", "ELSET", "MATERIAL", "SECTION", "ORIENTATION", "OFFSET1", "OFFSET2", of_mesh=True)
+@card("SURFACE SECTION", "ELSET", "DENSITY", of_mesh=True)
 def other_section(reading: Reading, given: Card) -> str:
     """Sections of shells and the like, whose elements carry something."""
     elements = given.needed("ELSET")
@@ -113,7 +114,7 @@ def other_section(reading: Reading, given: Card) -> str:
     return f"section of {elements}"
 
 
-@card("ORIENTATION", "NAME", "SYSTEM")
+@card("ORIENTATION", "NAME", "SYSTEM", of_mesh=True)
 def orientation(reading: Reading, given: Card) -> str:
     """*ORIENTATION: local directions, by two points and an origin."""
     name = given.needed("NAME")

@@ -1,19 +1,21 @@
 """A deck as a plain description: arrays and small records, which know nothing of contact problems.
 
-While it is read, nodes, elements, sets and surfaces belong to a `Region`: the deck itself, a part, or an instance of a
-part. `enumsol.decks.assembly` puts them together to what `Deck` holds in the end: one list of nodes and one of elements
-for everything, and sets and surfaces by the rows in these.
+While it is read, nodes, elements, sets and surfaces belong to a `DeckRegion`: the deck itself, a part, or an instance
+of a part. `enumsol.decks.assembly` puts them together to what `Deck` holds in the end: one list of nodes and one of
+elements for everything, and sets and surfaces by the rows in these.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 from pathlib import Path
 
 import numpy as np
 
-from enumsol.decks.cards import Place, is_number, key
+from enumsol.decks.cards import DeckPlace, is_number, key
 from enumsol.decks.elements import ElementType
+from enumsol.decks.steps import Analysis
 from enumsol.errors import InvalidArgumentError
 from enumsol.support.array_types import Floats, Integers
 from enumsol.support.messages import listed
@@ -21,11 +23,11 @@ from enumsol.support.messages import listed
 
 @dataclass(frozen=True)
 class Account:
-    """What became of a card.
+    """An entry of the account: a card, and what became of it.
 
     Attributes
     ----------
-    place : Place
+    place : DeckPlace
     card : str
         Its name.
     became : str
@@ -34,7 +36,7 @@ class Account:
         Whether it is part of the description.
     """
 
-    place: Place
+    place: DeckPlace
     card: str
     became: str
     used: bool = True
@@ -51,22 +53,22 @@ class ElementBlock:
         Numbers of the elements in the deck.
     nodes : (m, k) int array
         Their nodes in the deck's order: numbers while a region is read, rows of ``Deck.points`` in a deck.
-    place : Place
+    place : DeckPlace
     """
 
     type: ElementType
     labels: Integers
     nodes: Integers
-    place: Place
+    place: DeckPlace
 
 
 @dataclass(eq=False)
 class Members:
-    """What a set or a surface is made of, while a region is read.
+    """A set or a surface while a region is read: what it is made of.
 
     Attributes
     ----------
-    place : Place
+    place : DeckPlace
         Where it begins.
     spelled : str
         Its name as it is written there.
@@ -77,9 +79,9 @@ class Members:
         Whether it is a surface of nodes.
     """
 
-    place: Place
+    place: DeckPlace
     spelled: str
-    parts: list[tuple[str, Integers | range | str, str, Place]] = field(default_factory=list)
+    parts: list[tuple[str, Integers | range | str, str, DeckPlace]] = field(default_factory=list)
     nodal: bool = False
 
 
@@ -97,7 +99,7 @@ class Section:
         Of plane elements; None if the deck gives none.
     orientation : str
         Key of the orientation, or "".
-    place : Place
+    place : DeckPlace
     """
 
     kind: str
@@ -105,7 +107,7 @@ class Section:
     material: str
     thickness: float | None
     orientation: str
-    place: Place
+    place: DeckPlace
 
 
 @dataclass(frozen=True, eq=False)
@@ -121,14 +123,14 @@ class Orientation:
     origin : (3,) array
     rotation : (int, float) or None
         A local axis, 1 to 3, and degrees of an additional rotation about it.
-    place : Place
+    place : DeckPlace
     """
 
     system: str
     points: Floats
     origin: Floats
     rotation: tuple[int, float] | None
-    place: Place
+    place: DeckPlace
 
 
 @dataclass(eq=False)
@@ -138,7 +140,7 @@ class Material:
     Attributes
     ----------
     name : str
-    place : Place
+    place : DeckPlace
     elastic : str
         "ISO", "ORTHO" (nine moduli D1111, D1122, D2222, D1133, D2233, D3333, D1212, D1313, D2323) or
         "ENGINEERING CONSTANTS" (E1, E2, E3, nu12, nu13, nu23, G12, G13, G23); "" if it has none.
@@ -149,28 +151,30 @@ class Material:
         Coefficients of thermal expansion: one, or three along the local directions.
     zero : float
         Temperature from which expansion is measured.
-    elastic_place, expansion_place : Place or None
+    elastic_place, expansion_place : DeckPlace or None
     """
 
     name: str
-    place: Place
+    place: DeckPlace
     elastic: str = ""
     constants: Floats = field(default_factory=lambda: np.zeros(0))
     density: float | None = None
     expansion: Floats | None = None
     zero: float = 0.0
-    elastic_place: Place | None = None
-    expansion_place: Place | None = None
+    elastic_place: DeckPlace | None = None
+    expansion_place: DeckPlace | None = None
 
 
 @dataclass(eq=False)
-class Region:
+class DeckRegion:
     """Nodes, elements, sets and surfaces with numbers and names of their own: of the deck itself, or of a part.
 
     Attributes
     ----------
-    place : Place or None
-    nodes : list of (Place, labels, points)
+    place : DeckPlace or None
+    spelled : str
+        Name of the part or the instance as it is written.
+    nodes : list of (DeckPlace, labels, points)
     blocks : list of ElementBlock
     sets : dict of ("NSET", "ELSET" or "SURFACE", key) to Members
     sections : list of Section
@@ -178,26 +182,29 @@ class Region:
     translation : (3,) array
     rotation : (7,) array or None
         Two points on an axis, and degrees about it, for after the translation.
+    is_used : bool
+        Whether there is an instance of the part.
     """
 
-    place: Place | None = None
-    nodes: list[tuple[Place, Integers, Floats]] = field(default_factory=list)
+    place: DeckPlace | None = None
+    spelled: str = ""
+    nodes: list[tuple[DeckPlace, Integers, Floats]] = field(default_factory=list)
     blocks: list[ElementBlock] = field(default_factory=list)
     sets: dict[tuple[str, str], Members] = field(default_factory=dict)
     sections: list[Section] = field(default_factory=list)
     orientations: dict[str, Orientation] = field(default_factory=dict)
     translation: Floats = field(default_factory=lambda: np.zeros(3))
     rotation: Floats | None = None
+    is_used: bool = False
 
-    def members(self, kind: str, spelled: str, place: Place) -> Members:
+    def members(self, kind: str, spelled: str, place: DeckPlace) -> Members:
         """Members of a set or surface, which begins here if its name is new."""
         return self.sets.setdefault((kind, key(spelled)), Members(place, spelled.strip('"')))
 
-    def copied(self) -> Region:
-        """The same for an instance, which may have more."""
+    def copied(self, place: DeckPlace, spelled: str) -> DeckRegion:
+        """Copy for an instance, which may get more."""
         sets = {name: replace(own, parts=[*own.parts]) for name, own in self.sets.items()}
-        return Region(
-            self.place, [*self.nodes], [*self.blocks], sets, [*self.sections], dict(self.orientations)
+        return DeckRegion(place, spelled, [*self.nodes], [*self.blocks], sets, [*self.sections], dict(self.orientations)
         )  # fmt: skip
 
     def moved(self, points: Floats) -> Floats:
@@ -220,14 +227,14 @@ class Surface:
 
     Attributes
     ----------
-    place : Place
+    place : DeckPlace
     faces : (k, 2) int array
         Rows of elements, and numbers of their faces from 0; -1 for the element itself, of lower dimension than bodies.
     nodes : (k,) int array or None
         Rows of its nodes, of a surface of nodes.
     """
 
-    place: Place
+    place: DeckPlace
     faces: Integers
     nodes: Integers | None = None
 
@@ -256,6 +263,8 @@ class Deck:
     orientations : dict of keys to Orientation
     instances : dict of keys ("" for the deck itself) to (first row of nodes, behind the last, first row of elements,
         behind the last)
+    analysis : Analysis
+        Steps, contacts and constraints.
     account : list of Account
     """
 
@@ -272,14 +281,15 @@ class Deck:
     sections: list[Section] = field(default_factory=list)
     orientations: dict[str, Orientation] = field(default_factory=dict)
     instances: dict[str, tuple[int, int, int, int]] = field(default_factory=dict)
+    analysis: Analysis = field(default_factory=Analysis)
     account: list[Account] = field(default_factory=list)
 
-    @property
+    @cached_property
     def element_labels(self) -> Integers:
         """Numbers (M,) of all elements in the deck."""
         return np.concatenate([np.zeros(0, dtype=np.int64), *(block.labels for block in self.blocks)])
 
-    def nodes_of(self, name: str, place: Place) -> Integers:
+    def nodes_of(self, name: str, place: DeckPlace) -> Integers:
         """Rows of the nodes that a card names: a number, a set, or either of an instance ("L-1.3", "L-1.FLOOR").
 
         Raises
@@ -289,7 +299,7 @@ class Deck:
         """
         return self._rows(name, place, "node", self.node_sets, self.node_labels, 0)
 
-    def elements_of(self, name: str, place: Place) -> Integers:
+    def elements_of(self, name: str, place: DeckPlace) -> Integers:
         """Rows of the elements that a card names, as `nodes_of` those of nodes.
 
         Raises
@@ -308,7 +318,7 @@ class Deck:
         return self._name(row, self.element_labels, 2)
 
     def _rows(
-        self, name: str, place: Place, what: str, sets: dict[str, Integers], labels: Integers, column: int
+        self, name: str, place: DeckPlace, what: str, sets: dict[str, Integers], labels: Integers, column: int
     ) -> Integers:
         instance, _, number = name.strip().rpartition(".")
         if is_number(number) and key(instance) in self.instances:

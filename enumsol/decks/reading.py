@@ -6,14 +6,14 @@ from collections.abc import Collection
 from pathlib import Path
 
 # the modules that fill the table of cards
-from enumsol.decks import material_cards, mesh_cards  # noqa: F401
+from enumsol.decks import constraint_cards, contact_cards, material_cards, mesh_cards, step_cards  # noqa: F401
 from enumsol.decks.assembly import put_together
 from enumsol.decks.cards import cards_of
 from enumsol.decks.model import Deck
 from enumsol.decks.registry import Reading, compact
 
 
-def described(path: Path, *, ignore: Collection[str] = ()) -> Deck:
+def described(path: Path, *, ignore: Collection[str] = (), bare: bool = False) -> Deck:
     r"""Description of a deck.
 
     Parameters
@@ -21,6 +21,8 @@ def described(path: Path, *, ignore: Collection[str] = ()) -> Deck:
     path : Path
     ignore : collection of str
         Names of cards and of types of elements that are passed over.
+    bare : bool
+        Read the mesh alone: cards of loads, materials, contact and the like are not looked at.
 
     Raises
     ------
@@ -37,7 +39,7 @@ def described(path: Path, *, ignore: Collection[str] = ()) -> Deck:
     >>> deck.element_sets, [entry.became for entry in deck.account]
     ({'ALL': array([0])}, ['3 nodes', '1 element of type CPS3'])
     """
-    reading = Reading(Deck(path), frozenset(map(compact, ignore)))
+    reading = Reading(Deck(path), frozenset(map(compact, ignore)), bare)
     for each in cards_of(path):
         reading.read(each)
     return put_together(reading)

@@ -5,11 +5,13 @@ A new card is a function with `@card(...)` in one of the modules whose names end
 
 from __future__ import annotations
 
+import difflib
 from collections.abc import Callable, Collection
 from dataclasses import dataclass, field
 
 from enumsol.decks.cards import Card
-from enumsol.decks.model import Account, Deck, Material, Region
+from enumsol.decks.model import Account, Deck, DeckRegion, Material
+from enumsol.decks.steps import Analysis
 
 #: Function that puts a card into the description, and returns what became of it in words; None for no words.
 Reader = Callable[["Reading", Card], str | None]
@@ -25,11 +27,13 @@ class Reading:
         The description, in which nodes, elements and sets come last.
     ignore : collection of str
         Cards, and types of elements, that are passed over because somebody says so.
-    region : Region
+    bare : bool
+        Read the mesh alone, with what belongs to it, and pass over all other cards.
+    region : DeckRegion
         What nodes, elements and sets are put into: the deck itself, a part or an instance.
-    top : Region
+    top : DeckRegion
         That of the deck itself.
-    parts, instances : dict of keys to Region
+    parts, instances : dict of keys to DeckRegion
     part, instance : str
         Key of the part or the instance that is being read, or "".
     material : Material or None
@@ -38,16 +42,22 @@ class Reading:
 
     deck: Deck
     ignore: Collection[str] = ()
-    top: Region = field(default_factory=Region)
-    parts: dict[str, Region] = field(default_factory=dict)
-    instances: dict[str, Region] = field(default_factory=dict)
+    bare: bool = False
+    top: DeckRegion = field(default_factory=DeckRegion)
+    parts: dict[str, DeckRegion] = field(default_factory=dict)
+    instances: dict[str, DeckRegion] = field(default_factory=dict)
     part: str = ""
     instance: str = ""
     material: Material | None = None
 
     @property
-    def region(self) -> Region:
-        """What nodes, elements and sets are put into."""
+    def analysis(self) -> Analysis:
+        """Description that cards of steps, contacts and constraints are put into."""
+        return self.deck.analysis
+
+    @property
+    def region(self) -> DeckRegion:
+        """Region that nodes, elements and sets are put into."""
         if self.part:
             return self.parts[self.part]
         return self.instances[self.instance] if self.instance else self.top
@@ -61,6 +71,9 @@ class Reading:
             It is not known, or not as expected.
         """
         name = compact(card.name)
+        close = [] if name in CARDS or name in HARMLESS else difflib.get_close_matches(name, CARDS, n=1, cutoff=0.8)
+        if self.bare and not any(CARDS[own].of_mesh for own in (name, *close) if own in CARDS):
+            return
         if name in self.ignore:
             self.account(card, "not used, as you say", used=False)
         elif name in CARDS:
@@ -74,7 +87,7 @@ class Reading:
             self.account(card, f"not used: {HARMLESS[name]}", used=False)
         else:
             raise card.refused(
-                f"is not read, and may change the answer; expected other cards, or "
+                f"is not read, and may change the answer; expected {f'*{close[0]}' if close else 'other cards'}, or "
                 f'--ignore {card.name.replace(" ", "")} (in Python ignore=["..."]) to do without it'
             )
 
@@ -85,10 +98,11 @@ class Reading:
 
 @dataclass(frozen=True)
 class Rule:
-    """A function that reads a card, and the options that it knows."""
+    """A function that reads a card, the options that it knows, and whether it belongs to the mesh."""
 
     read: Reader
     options: frozenset[str]
+    of_mesh: bool
 
 
 #: Cards that are read, by their names without blanks.
@@ -97,11 +111,11 @@ CARDS: dict[str, Rule] = {}
 HARMLESS: dict[str, str] = {}
 
 
-def card(name: str, *options: str) -> Callable[[Reader], Reader]:
+def card(name: str, *options: str, of_mesh: bool = False) -> Callable[[Reader], Reader]:
     """Enter a function in the table of cards, with the options that it knows."""
 
     def entered(read: Reader) -> Reader:
-        CARDS[compact(name)] = Rule(read, frozenset(map(compact, options)))
+        CARDS[compact(name)] = Rule(read, frozenset(map(compact, options)), of_mesh)
         return read
 
     return entered

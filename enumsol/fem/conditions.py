@@ -25,9 +25,6 @@ from enumsol.support.array_arguments import real_array, short_vector
 if TYPE_CHECKING:
     from typing import Literal
 
-    from skfem import DiscreteField
-    from skfem.assembly.form.form import FormExtraParams
-
     from enumsol.fem.bases import NodalBasis
     from enumsol.fem.meshes import PartedMesh
     from enumsol.support.array_types import ArrayLike, Floats, Integers, Mask
@@ -62,6 +59,7 @@ class Options:
     clamp: Names
     symmetry: Names
     displacement: Mapping[str, Sequence[Any]] | None
+    displacement_slope: Mapping[str, Sequence[Any]] | None
     spring: Vectors
     load: Vectors
     load_slope: Vectors
@@ -195,10 +193,10 @@ def supports_of(mesh: PartedMesh, options: Options) -> Supports:
         One names no part or is not of its form, or they contradict each other.
     """
     shape = mesh.points.shape
-    found = Supports(np.zeros(shape, dtype=bool), np.zeros(shape), np.zeros(shape, dtype=bool))
+    found = Supports.none(shape)
     for part in names_of(options.clamp, "clamp"):
         for component in range(shape[1]):
-            _fix(found, part, mesh.nodes(part), component, 0.0)
+            _fix(found, part, mesh.nodes(part), component)
     for part in names_of(options.symmetry, "symmetry"):
         nodes = mesh.nodes(part)
         flat = _flat(mesh, nodes)
@@ -208,15 +206,27 @@ def supports_of(mesh: PartedMesh, options: Options) -> Supports:
                 f"symmetry {part} lies in {where} perpendicular to an axis; expected a part of the boundary in one "
                 "such plane"
             )
-        _fix(found, part, nodes, flat[0], 0.0)
+        _fix(found, part, nodes, flat[0])
         found.mirrored[nodes, flat[0]] = True
-    for part, value in by_part(options.displacement, "displacement").items():
-        nodes, given = mesh.nodes(part), _components(value, f"displacement of {part}", shape[1])
-        for component, entry in given.items():
-            _fix(found, part, nodes, component, entry)
+    for part, given in displacements_of(options, shape[1]).items():
+        nodes = mesh.nodes(part)
+        for component, (value, slope) in given.items():
+            _fix(found, part, nodes, component, value, slope)
         # rollers in a plane are a plane of symmetry, however they are given
-        if len(given) == 1 and 0.0 in given.values() and _flat(mesh, nodes) == [*given]:
+        if len(given) == 1 and (0.0, 0.0) in given.values() and _flat(mesh, nodes) == [*given]:
             found.mirrored[nodes, next(iter(given))] = True
+    return found
+
+
+def displacements_of(options: Options, dimension: int) -> dict[str, dict[int, tuple[float, float]]]:
+    """Given displacements of parts by components, each at alpha = 0 and its derivative; one not given is 0."""
+    found: dict[str, dict[int, tuple[float, float]]] = {}
+    for k, name in enumerate(("displacement", "displacement_slope")):
+        for part, value in by_part(getattr(options, name), name).items():
+            for component, entry in _components(value, f"{name} of {part}", dimension).items():
+                both = [*found.setdefault(part, {}).get(component, (0.0, 0.0))]
+                both[k] = entry
+                found[part][component] = (both[0], both[1])
     return found
 
 
@@ -239,17 +249,20 @@ def _flat(mesh: PartedMesh, nodes: Integers) -> list[int]:
     return np.flatnonzero(np.ptp(mesh.points[nodes], axis=0) <= SAME * extent).tolist()
 
 
-def _fix(supports: Supports, part: str, nodes: Integers, component: int, value: float) -> None:
-    fixed, values = supports.fixed, supports.values
-    differ = fixed[nodes, component] & (values[nodes, component] != value)
-    if np.any(differ):
-        node = int(nodes[np.argmax(differ)])
-        raise InvalidArgumentError(
-            f"{part} moves node {node} by {value:g} in {'xyz'[component]}, and another part that shares it by "
-            f"{values[node, component]:g}; expected one displacement"
-        )
+def _fix(
+    supports: Supports, part: str, nodes: Integers, component: int, value: float = 0.0, slope: float = 0.0
+) -> None:
+    fixed = supports.fixed
+    for array, own, times in ((supports.values, value, ""), (supports.slopes, slope, " alpha")):
+        differ = fixed[nodes, component] & (array[nodes, component] != own)
+        if np.any(differ):
+            node = int(nodes[np.argmax(differ)])
+            raise InvalidArgumentError(
+                f"{part} moves node {node} by {own:g}{times} in {'xyz'[component]}, and another part that shares it by "
+                f"{array[node, component]:g}{times}; expected one displacement"
+            )
+        array[nodes, component] = own
     fixed[nodes, component] = True
-    values[nodes, component] = value
 
 
 @dataclass(frozen=True)
@@ -402,30 +415,22 @@ def body_force_of(mesh: PartedMesh, value: object, name: str) -> Floats:
 
 def part_forces(body: NodalBasis, mesh: PartedMesh, loads: object, pressures: object, slope: str = "") -> Floats:
     """Nodal forces (N, d) of tractions and of pressures, which push into the body, on parts."""
-    from skfem.helpers import dot  # as in nodal_basis
-
     total, dimension = np.zeros(mesh.points.shape), mesh.points.shape[1]
     for part, value in by_part(loads, f"load{slope}").items():
         traction = short_vector(value, f"load{slope} of {part}", dimension)
-
-        def along(v: DiscreteField, _: FormExtraParams, t: Floats = traction[:, None, None]) -> DiscreteField:
-            return dot(t, v)
-
-        total += body.on_part(mesh.part(part), part, along)
+        total += body.on_part(mesh.part(part), part, partial(_constant, traction[:, None, None]))
     for part, value in by_part(pressures, f"pressure{slope}").items():
         pressure = finite_number(value, f"pressure{slope} of {part}")
-
-        def inward(v: DiscreteField, w: FormExtraParams, p: float = pressure) -> DiscreteField:
-            return -p * dot(w.n, v)
-
-        total += body.on_part(mesh.part(part), part, inward)
+        total += body.on_part(mesh.part(part), part, partial(np.multiply, -pressure))
     return total
+
+
+def _constant(traction: Floats, _: Floats) -> Floats:
+    return traction
 
 
 def part_springs(body: NodalBasis, mesh: PartedMesh, springs: object) -> sp.csc_array:
     """Stiffness (dN, dN) of springs between parts and the ground, lumped at the nodes."""
-    from skfem.helpers import dot  # as above
-
     count, dimension = mesh.points.shape
     blocks = np.zeros((count, dimension, dimension))
     for part, value in by_part(springs, "spring").items():
@@ -437,10 +442,8 @@ def part_springs(body: NodalBasis, mesh: PartedMesh, springs: object) -> sp.csc_
         for k, axis in enumerate(np.eye(dimension)):
             across = tangential * axis[:, None, None]
 
-            def density(
-                v: DiscreteField, w: FormExtraParams, k: int = k, a: Floats = across, b: float = normal - tangential
-            ) -> DiscreteField:
-                return dot(a + b * w.n[k] * w.n, v)
+            def density(n: Floats, k: int = k, a: Floats = across, b: float = normal - tangential) -> Floats:
+                return np.asarray(a + b * n[k] * n)
 
             blocks[:, :, k] += body.on_part(mesh.part(part), part, density, lumped=True)
     shape = (count * dimension, count * dimension)

@@ -181,6 +181,7 @@ def mesh_problem(
     clamp: Names = (),
     symmetry: Names = (),
     displacement: Mapping[str, Sequence[Any]] | None = None,
+    displacement_slope: Mapping[str, Sequence[Any]] | None = None,
     spring: Vectors = None,
     load: Vectors = None,
     load_slope: Vectors = None,
@@ -244,8 +245,9 @@ def mesh_problem(
         Parts that are held in all components.
     symmetry : name or names
         Parts in planes perpendicular to an axis, held in the direction of that axis: planes of symmetry, rollers.
-    displacement : mapping of names to components
-        Given displacements in x, y (and z), each a number [length], or ``"free"`` or None where it is not given.
+    displacement, displacement_slope : mapping of names to components
+        Given displacements in x, y (and z), and their derivatives with respect to alpha, each a number [length], or
+        ``"free"`` or None where it is not given. With a slope the last entry of u is alpha.
     spring : mapping of names to (kn, kt)
         Springs to the ground along the normal and across it, per area (in 2D per length) [force / length^3].
     load, load_slope : mapping of names to vectors
@@ -300,7 +302,8 @@ def mesh_problem(
     given = Options(
         young=young, poisson=poisson, contact=contact, pairs=pairs, plane=plane, thickness=thickness, density=density,
         friction=friction, friction_slope=friction_slope, friction2=friction2, friction2_slope=friction2_slope,
-        axis=axis, clamp=clamp, symmetry=symmetry, displacement=displacement, spring=spring,
+        axis=axis, clamp=clamp, symmetry=symmetry, displacement=displacement,
+        displacement_slope=displacement_slope, spring=spring,
         load=load, load_slope=load_slope, pressure=pressure, pressure_slope=pressure_slope, body_force=body_force,
         body_force_slope=body_force_slope, force=force, force_slope=force_slope,
         gap=gap, obstacle=obstacle, max_rigid_displacement=max_rigid_displacement, groups=groups,

@@ -7,12 +7,11 @@ from collections.abc import Mapping
 import numpy as np
 import scipy.sparse as sp
 
+from enumsol.decks.elements import element_type
 from enumsol.errors import InvalidArgumentError
-from enumsol.fem.assembly import outward_normal
 from enumsol.fem.bases import SIMPLICES, corners_of, place_of
 from enumsol.fem.conditions import holding
 from enumsol.fem.contacts import Group, faced
-from enumsol.fem.file_counts import taken_as
 from enumsol.fem.meshes import SAME, PartedMesh, cell_name, unit_vectors
 from enumsol.fem.scenes import Scene
 from enumsol.model.cells import boundary_facets
@@ -107,7 +106,7 @@ def refuse_walls(scene: Scene) -> None:
         others = boundary[~piece.nodes[boundary[:, 0]]]
         if not np.any(own):
             continue
-        outward = scene.body.on_part(others, "boundary", outward_normal)
+        outward = scene.body.on_part(others, "boundary", np.asarray)
         found, weights, gaps = faced(mesh.points, nodes[own], group.normals[own], others, outward, others[:0])
         touching = nodes[own][found][gaps == 0.0]
         for part in group.parts:
@@ -188,7 +187,13 @@ def scene_notes(scene: Scene) -> list[str]:
 
 def _formulations(scene: Scene) -> list[str]:
     """Notes on elements of the file that others take the place of."""
-    return taken_as(scene.mesh.types)
+    kinds = [kind for kind in map(element_type, scene.mesh.types) if kind is not None and kind.is_body]
+    return [
+        f"elements of type {kind.name} are taken as {kind.plain}, with full integration and without incompatible "
+        "modes, hybrid or modified formulations, which can be stiffer in bending than the program of the file has them"
+        for kind in kinds
+        if kind.name != kind.plain
+    ]
 
 
 def _unjoined(scene: Scene) -> list[str]:
@@ -237,7 +242,7 @@ def _turning(scene: Scene) -> list[str]:
         pair = group.pair
         if pair is None or not np.any(loose & _nodes_of(mesh, group)):
             continue
-        outward = scene.body.on_part(mesh.part(pair.master), pair.master, outward_normal)
+        outward = scene.body.on_part(mesh.part(pair.master), pair.master, np.asarray)
         facing = unit_vectors(np.asarray(sp.csr_array(-rows).maximum(0) @ outward), "normals of the other side")
         apart = float(np.degrees(np.max(np.arccos(np.clip(-np.sum(facing * group.normals, axis=1), -1.0, 1.0)))))
         if apart > 10.0:  # degrees, of a pocket
@@ -284,7 +289,7 @@ def _alone(scene: Scene) -> list[str]:
 
 def _rest(scene: Scene) -> list[str]:
     """Nothing that acts on the bodies."""
-    acting = np.any(scene.forces) or np.any(scene.slope) or np.any(scene.held.values)
+    acting = np.any(scene.forces) or np.any(scene.slope) or np.any(scene.held.values) or np.any(scene.held.slopes)
     if acting or np.any(scene.gaps < 0):
         return []
     return ["nothing acts on the body: it has no load, press fit or given displacement, and rests"]

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import scipy.sparse as sp
 
-from enumsol.model.cells import KINDS, boundary_facets, by_kind, facet_outlines, outline_edges
+from enumsol.model.cells import boundary, boundary_facets, facet_outlines, outline_edges
 from enumsol.model.shapes import SIGNS, BodyShape, acting_nodes, body_shape, first_view, row_frames, row_tangents, signs
 
 if TYPE_CHECKING:
@@ -52,7 +52,7 @@ def body_record(problem: AnyProblem, scene: Scene | None = None) -> tuple[dict[s
     solved = [problem.factorization.solve(np.asarray(column)) for column in _loads(problem)]
     moved = [motion @ column for column in solved]
     moved[0] = moved[0] + shape.offset[nodes].ravel()
-    forces = -sp.csr_array(problem.contact_rows @ shape.motion.T).toarray().reshape(d * problem.p, -1, d)
+    forces = -sp.csr_array(problem.contact_rows @ shape.acting.T).toarray().reshape(d * problem.p, -1, d)
     return body | _stress_columns(problem, shape, solved) | {
         "u0": short_list(moved[0]),
         "u1": short_list(moved[1]),
@@ -78,12 +78,7 @@ def surface_stresses(problem: AnyProblem, shape: BodyShape, columns: int) -> Cal
     """
     if shape.points.shape[1] != 3 or problem.mesh is None or problem.mesh.lame is None:
         return None
-    owner = {}
-    for rows, nodes in by_kind(3, shape.cells):
-        local = nodes[:, KINDS[3, nodes.shape[1]].facets]
-        for facet, row in zip(local.reshape(-1, local.shape[2]), np.repeat(rows, local.shape[1]), strict=True):
-            owner[frozenset(facet.tolist())] = row
-    cells = [owner[frozenset(facet.tolist())] for facet in boundary_facets(3, shape.cells)]
+    _, cells = boundary(3, shape.cells)
     if 6 * len(cells) * columns > _MOST_NUMBERS:
         return None
     from enumsol.fem import cell_stresses  # scikit-fem takes a while
@@ -108,12 +103,12 @@ def drawn_body(
     contact surface is seen best. What `surroundings` gives is about a solid, too.
     """
     cells, d, new = shape.cells, shape.points.shape[1], np.full(len(shape.points), -1)
-    touched = np.unique(sp.csr_array(problem.contact_rows @ shape.motion.T).indices // d)
+    touched = np.unique(sp.csr_array(problem.contact_rows @ shape.acting.T).indices // d)
     if d == 3:
         faces = facet_outlines(boundary_facets(3, cells))
         nodes = np.union1d(faces, touched)
     else:
-        cells = cells[:, KINDS[2, cells.shape[1]].outline]
+        cells = facet_outlines(cells)
         edges, nodes = boundary_edges(cells), np.arange(len(new))
         if columns > most_fields(len(new), d):
             nodes = np.union1d(edges, touched)
@@ -140,9 +135,10 @@ def drawn_body(
 def _surface(shape: BodyShape, faces: Integers, new: Integers) -> dict[str, Any]:
     """Triangles and edges of the surface of a solid."""
     outline = outline_edges(shape.points, faces)
-    fan = [faces[:, [0, k, k + 1]] for k in range(1, faces.shape[1] - 1)]
+    fan = np.concatenate([faces[:, [0, k, k + 1]] for k in range(1, faces.shape[1] - 1)])
+    fan = fan[fan[:, 1] != fan[:, 2]]  # outlines of fewer nodes than others repeat their last
     return {
-        "triangles": new[np.concatenate(fan)].T.tolist(),
+        "triangles": new[fan].T.tolist(),
         # of many facets only the edges at which the surface bends
         "edges": new[_edges(faces) if len(faces) <= 2_000 else outline].tolist(),
         "outline": new[outline].tolist(),
@@ -182,7 +178,9 @@ def surroundings(
     """
     motion, (count, d) = shape.motion, shape.points.shape
     slope = np.zeros(problem.n) if problem.load_slope is None else problem.load_slope
-    forces = np.hstack([(motion @ vector).reshape(-1, d) for vector in (problem.f, slope)])
+    # what nothing is coupled with is held, or moved as alpha says
+    coupled = np.diff(problem.A.indptr) > 1
+    forces = np.hstack([(shape.acting @ np.where(coupled, own, 0.0)).reshape(-1, d) for own in (problem.f, slope)])
     acting = acting_nodes(forces)
     if len(np.setdiff1d(acting, edges)) > SIGNS:  # a weight: its resultant
         weights = np.linalg.norm(forces[acting], axis=1)
@@ -216,7 +214,7 @@ def _foundation(problem: AnyProblem, shape: BodyShape) -> dict[str, Any]:
     ``walls`` has (row, x, y, gap), normals of the rigid foundation; ``lame`` the coefficients of the cells, one pair if
     all are the same.
     """
-    normals = np.asarray(problem.Bn @ shape.motion.T @ np.tile(np.eye(2), (len(shape.points), 1)))
+    normals = np.asarray(problem.Bn @ shape.acting.T @ np.tile(np.eye(2), (len(shape.points), 1)))
     walls = [
         [k, *short_list([*normal, problem.gap[k]])]
         for k, normal in enumerate(normals)
@@ -254,7 +252,7 @@ def vectors(forces: Floats, nodes: Integers) -> list[list[float]]:
 def boundary_edges(outlines: Integers) -> Integers:
     """Edges that belong to one cell only, (k, 2)."""
     edges = np.concatenate([outlines[:, [k, (k + 1) % outlines.shape[1]]] for k in range(outlines.shape[1])])
-    edges = edges[edges[:, 0] != edges[:, 1]]  # triangles among quadrilaterals name a corner twice
+    edges = edges[edges[:, 0] != edges[:, 1]]  # outlines of fewer nodes than others repeat their last
     _, first, count = np.unique(np.sort(edges, axis=1), axis=0, return_index=True, return_counts=True)
     return np.asarray(edges[first[count == 1]])
 
