@@ -22,7 +22,7 @@ from . import (
     trusted as trusted,
 )
 from ._version import __version__ as __version__
-from .auditing import audit as audit, follow_all as follow_all
+from .auditing import audit as audit, compare_result as compare_result, follow_all as follow_all
 from .branches import (
     BranchGraph as BranchGraph,
     Span as Span,
@@ -56,6 +56,7 @@ from .errors import (
     OutputError as OutputError,
     TooLargeError as TooLargeError,
 )
+from .fem.deck_scenes import DeckModel as DeckModel, read_deck as read_deck
 from .fixed_points import (
     FixedPoint as FixedPoint,
     TrescaSolution as TrescaSolution,
@@ -65,6 +66,7 @@ from .fixed_points import (
     successive_approximations as successive_approximations,
 )
 from .io import read_problem as read_problem, write_problem as write_problem
+from .io.calculix import read_results as read_results, write_frd as write_frd
 from .io.vtu import write_vtu as write_vtu
 from .loading.growing import HistoryProgress as HistoryProgress, histories as histories
 from .loading.history import History as History

@@ -16,6 +16,7 @@ import enumsol
 LAYERS = (
     ("errors", "_version", "arithmetic"),
     ("support",),
+    ("decks",),
     ("condensation",),
     ("model",),
     ("trusted",),

@@ -4,6 +4,7 @@ from enumsol.auditing.audit_report import AuditedPoint, AuditReport, Jump, Misse
 from enumsol.auditing.auditor import audit
 from enumsol.auditing.follow_all import FollowAllResult, follow_all, follow_arc
 from enumsol.auditing.points import PointRun, read_points
+from enumsol.auditing.results import ResultComparison, compare_result
 
 __all__ = [
     "AuditReport",
@@ -12,7 +13,9 @@ __all__ = [
     "Jump",
     "MissedArc",
     "PointRun",
+    "ResultComparison",
     "audit",
+    "compare_result",
     "follow_all",
     "follow_arc",
     "read_points",

@@ -307,7 +307,7 @@ def multiplicity_table(
         Of ``enumerate_roots``.
     without : "running away", optional
         Leave out the isolated roots that are proven to run away (see `stability`; the problem needs a mass or a mesh).
-        Undecided ones are counted as roots.
+        Undecided ones are counted as roots, and the row is then not complete.
     executor : concurrent.futures.Executor, optional
         Enumerates at several alphas at a time: a process pool, or the Client of a dask cluster.
     jobs : int, optional
@@ -417,7 +417,7 @@ def table_row(
         "families": len(roots.families),
         **{name: counts[status] for status, name in kinds_of(problem).items()},
         "index_sum": roots.index_sum,
-        "complete": roots.complete,
+        "complete": roots.complete and "undecided" not in verdicts,
         "undecided": len(roots.undecided),
         "stopped": roots.stopped,
         "nodes": roots.stats.nodes,

@@ -11,8 +11,7 @@ from enumsol.checker.reports import MAX_FAILURES, HistoryVerificationReport
 from enumsol.checker.walk import ProofChecker
 from enumsol.condensation.enclosure import enclosure_of
 from enumsol.model.restart import SlipStart, afresh, restarted
-from enumsol.proof.proof_file import PROOF_VERSION
-from enumsol.proof.reading import RefusedError, numbers_from, quoted, rational_from, same
+from enumsol.proof.reading import RefusedError, check_header, numbers_from, quoted, rational_from, same
 from enumsol.support.deadlines import heard_by, tell, tell_part
 from enumsol.trusted.positions import tangential_positions
 
@@ -24,7 +23,6 @@ if TYPE_CHECKING:
     from enumsol.checker.walk import Located
     from enumsol.support.array_types import Floats
 
-_HEADER = {"format", "version", "kind", "problem", "p", "steps", "stages"}
 _END = object()
 
 
@@ -118,11 +116,8 @@ class HistoryChecker(ProofChecker):
 
     def _read_header(self) -> int:
         """Read the steps; the number of searches."""
-        header, problem = self.header, self.problem
-        if set(header) != _HEADER or header["format"] != "enumsol-proof" or not same(header["version"], PROOF_VERSION):
-            raise RefusedError("the first record is not the header of a history in a proof of this format")
-        if header["problem"] != problem.fingerprint or not same(header["p"], problem.p):
-            raise RefusedError("the proof belongs to another problem (its fingerprint is different)")
+        header = self.header
+        check_header(header, self.problem, "history", {"steps", "stages"})
         if not isinstance(header["steps"], list) or not header["steps"] or type(header["stages"]) is not int:
             raise RefusedError("the header has no steps")
         try:

@@ -20,8 +20,7 @@ from enumsol.checker.walk import ProofChecker
 from enumsol.condensation.enclosure import enclosure_of
 from enumsol.errors import InvalidArgumentError, InvalidProblemError
 from enumsol.model.mass import checked_mass, mass_fingerprint
-from enumsol.proof.proof_file import PROOF_VERSION
-from enumsol.proof.reading import RefusedError, quoted, same
+from enumsol.proof.reading import RefusedError, check_header, quoted, same
 from enumsol.proof.stability_records import (
     DOES_NOT,
     RUNS_AWAY,
@@ -33,7 +32,7 @@ from enumsol.proof.stability_records import (
     root_from,
 )
 from enumsol.support.messages import counted
-from enumsol.trusted.motions_of_body import BodyMotions, friction_over
+from enumsol.trusted.motions_of_body import BodyMotions, friction_directions, friction_over
 from enumsol.trusted.running_away import Growing, NoMotion, covers
 from enumsol.trusted.status_rows import OPEN, STICK
 
@@ -46,7 +45,6 @@ if TYPE_CHECKING:
     from enumsol.support.array_types import Floats
     from enumsol.trusted.motions_of_body import Setting
 
-_HEADER = {"format", "version", "kind", "problem", "p", "mass"}
 _END = object()
 #: Above rounding in a few operations.
 _ABOVE, _BELOW = 1 + 2.0**-40, 1 - 2.0**-40
@@ -122,16 +120,12 @@ class StabilityChecker(ProofChecker):
     # -- records ---------------------------------------------------------------------------------------------------
 
     def _read_header(self) -> None:
-        header, problem = self.header, self.problem
-        if set(header) != _HEADER or header["format"] != "enumsol-proof" or not same(header["version"], PROOF_VERSION):
-            raise RefusedError("the first record is not the header of a proof of stability of this format")
-        if header["problem"] != problem.fingerprint or not same(header["p"], problem.p):
-            raise RefusedError("the proof belongs to another problem (its fingerprint is different)")
+        check_header(self.header, self.problem, "stability", {"mass"})
         try:
-            self.body = BodyMotions(problem, self.mass)
+            self.body = BodyMotions(self.problem, self.mass)
         except (InvalidArgumentError, InvalidProblemError) as error:
             raise RefusedError(str(error)) from None
-        if header["mass"] != mass_fingerprint(self.body.mass):
+        if self.header["mass"] != mass_fingerprint(self.body.mass):
             raise RefusedError("the proof belongs to another mass (its fingerprint is different)")
 
     def _roots(self, records: Iterator[Any]) -> list[_Root]:
@@ -218,7 +212,8 @@ class StabilityChecker(ProofChecker):
                 self.fail(f"root {said.number} is said to be undecided and has certificates")
             return UNDECIDED, None
         codes, forces = root.known
-        parts = list(self.body.settings([{code} for code in codes], self.F, forces))
+        directions = None if forces is None else friction_directions(forces, self.F)
+        parts = list(self.body.settings([{code} for code in codes], self.F, directions))
         given: list[list[Growing | NoMotion]] = [[] for _ in parts]
         try:
             for record in said.certificates:

@@ -4,15 +4,16 @@ from __future__ import annotations
 
 import sys
 from dataclasses import asdict
-from typing import TYPE_CHECKING, Annotated, Any, Literal
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any, Literal, NoReturn
 
 import typer
 
-from enumsol.cli.common import ExitStatus, finish, load_problem, parse_alpha, parse_interval, so_far
+from enumsol.cli.common import ExitStatus, finish, load_problem, parse_alpha, parse_interval, scene_of, so_far
 from enumsol.cli.graph import build, read_graph
 from enumsol.cli.options import Argument, Arithmetic, Number, OutputFile, Problem, Quiet
 from enumsol.cli.output import deliver
-from enumsol.cli.progress import Display
+from enumsol.cli.progress import Display, search_display
 from enumsol.errors import InvalidArgumentError
 from enumsol.support.messages import counted
 
@@ -25,6 +26,8 @@ if TYPE_CHECKING:
     from enumsol.model.problem3d import AnyProblem
     from enumsol.support.array_types import Alpha
 
+#: Endings of results of CalculiX.
+_RESULTS = (".frd", ".dat")
 #: As of ``read_points``, which is not imported for --help.
 Columns = Literal["auto", "rows", "labels"]
 
@@ -36,13 +39,14 @@ def audit(
     last: Number | None = None,
     graph_file: Annotated[str | None, typer.Option(metavar="GRAPH")] = None,
     arithmetic: Arithmetic = "verified",
-    tolerance: Annotated[float, typer.Option(metavar="LENGTH")] = 1e-5,
+    tolerance: Annotated[float | None, typer.Option(metavar="NUMBER")] = None,
     columns: Columns = "auto",
+    alpha: Number | None = None,
     json_file: OutputFile | None = None,
     csv_file: OutputFile | None = None,
     quiet: Quiet = False,
 ) -> None:
-    """Check POINTS, from any continuation code, against all solutions of PROBLEM.
+    """Check POINTS, from any continuation code, or a RESULT of CalculiX against all solutions of PROBLEM.
 
     Reports how far every point is from the nearest arc of the branch graph, where a path jumped from one branch to
     another, which arcs in the interval no path visited, and which points could not be compared. Points are named by
@@ -60,6 +64,11 @@ def audit(
     the file has five digits. If it stops at a small residual, the error of the forces may be larger. Solutions that are
     closer to each other than the tolerance, and jumps between them, cannot be distinguished.
 
+    Results: of a file .frd or .dat of CalculiX the displacements of its last increment are compared with those of all
+    roots at one alpha, which is told which of them it is, and which ones it is not. The tolerance is then the largest
+    difference of a displacement in parts of the largest displacement, by default 0.05; the result has to be nearer to
+    the root than half way to any other. The exit status is 0 if it is one of the roots, else 3.
+
     Exit status: 0 if every point is on the graph, no path jumped and no arc was missed; 3 if not, or if the graph is
     known to be incomplete (in fast arithmetic, which proves nothing: if its degrees do not balance); 4 if points were
     not compared, whatever else was found, because their alpha is outside the interval of the graph, or because a graph
@@ -69,18 +78,27 @@ def audit(
     Parameters
     ----------
     points : CSV with the columns alpha, lambda_n_X and lambda_t_X for every contact node X and, for several paths,
-        path; - is stdin.
+        path; - is stdin. Or a file .frd or .dat of CalculiX.
     first : First alpha; default: that of the points.
     last : Last alpha; default: that of the points.
     graph_file : A graph written by enumsol graph --save.
     arithmetic : Arithmetic of the graph, as in enumsol graph.
-    tolerance : Distance from every arc beyond which a point is off the graph, as explained above; dimensionless.
+    tolerance : Distance beyond which a point is off the graph, or a result no root, as explained above; dimensionless.
     columns : Whether the X of lambda_n_X is the node's row number (from 0) or its label.
+    alpha : Of a result, where friction or load depend on it; default: 0.
     csv_file : Write a table with one row per point; - is stdout.
     """
     from enumsol.auditing import audit as check  # numpy and scipy: not for --help
+    from enumsol.auditing.auditor import POINT_TOLERANCE
     from enumsol.auditing.graph_map import checked_tolerance
 
+    if Path(points).suffix.lower() in _RESULTS:
+        if csv_file or graph_file or not first is last is None:
+            raise InvalidArgumentError(f"{points} is a result; expected no --csv, --graph, --from or --to with it")
+        _audit_result(problem, points, alpha, tolerance, arithmetic, json_file)
+    if alpha is not None:
+        raise InvalidArgumentError("--alpha is given, but points have their own; expected it with a result of CalculiX")
+    tolerance = POINT_TOLERANCE if tolerance is None else tolerance
     checked_tolerance(tolerance)
     if graph_file is not None and (first is not None or last is not None):
         raise InvalidArgumentError("--graph and --from or --to are both given; a graph has its own interval")
@@ -97,6 +115,33 @@ def audit(
         frame=report.to_frame,
     )
     finish(ended, _status(report))
+
+
+def _audit_result(
+    name: str, file: str, alpha: str | None, tolerance: float | None, arithmetic: Arithmetic, json_file: str | None
+) -> NoReturn:
+    """Compare a result of CalculiX with all roots, and end the command."""
+    from enumsol.auditing.results import TOLERANCE, compare_result  # numpy and scipy: not for --help
+    from enumsol.io.calculix import read_results
+    from enumsol.roots.enumerate import enumerate_roots
+
+    result = read_results(file)[-1]
+    body, about = load_problem(name), scene_of(name)
+    if body.mesh is None:
+        raise InvalidArgumentError(f"{name} has no mesh; expected a problem made of one, to compare with {file}")
+    plane = None if about is None else about.options.plane
+    moved = result.on(body.mesh, axisymmetric=str(plane) == "axisymmetric")
+    with search_display() as display:
+        found, ended = so_far(
+            lambda: enumerate_roots(body, parse_alpha(alpha or "0"), arithmetic=arithmetic, progress=display)
+        )
+    compared = compare_result(body, found, moved, tolerance=TOLERANCE if tolerance is None else tolerance)
+    deliver(
+        json_file=json_file,
+        text=lambda: f"{file} at time {result.time:g}: {compared}",
+        content=lambda: {"problem": name, "file": file, "time": result.time, **compared.summary()},
+    )
+    finish(ended, ExitStatus.INCOMPLETE if compared.found is None else ExitStatus.DONE)
 
 
 def _read_runs(points: str, problem: AnyProblem, columns: Columns) -> Sequence[PointRun]:

@@ -41,6 +41,7 @@ _NO_TEXTS = {
     **dict.fromkeys(("--proof", "--save", "--graphml", "--report", "report --output"), ""),
     **dict.fromkeys(("roots --proof", "solve --proof"), ", but a proof is a binary file"),
     **dict.fromkeys(("--npz", "--vtu"), ", but it is a binary file"),
+    "--frd": "",
     "--plot": ", but a figure is a binary file",
 }
 #: Patterns by which meshes name files that belong to them: heavy data of XDMF, included files of Abaqus.
@@ -94,15 +95,16 @@ def check_output(name: str, value: str, own: str) -> None:
     kind = own if own in _NO_TEXTS else name
     if kind not in _NO_TEXTS and kind not in _TEXTS:
         return  # a problem, which may be a directory
-    if name == "--vtu" and value != "-" and not value.endswith(".vtu"):
-        raise InvalidArgumentError(f"--vtu is {value!r}; expected a name that ends in .vtu")
+    ending = f".{name.removeprefix('--')}"
+    if name in ("--vtu", "--frd") and value != "-" and not value.endswith(ending):
+        raise InvalidArgumentError(f"{name} is {value!r}; expected a name that ends in {ending}")
     if name == "--plot":
         _need("matplotlib", name, "plots")
     if value != "-":
         _check_writable(value, name)
     elif kind in _NO_TEXTS:
         raise InvalidArgumentError(f"{name} is -{_NO_TEXTS[kind]}; expected the name of a file")
-    if name == "--vtu":
+    if name in ("--vtu", "--frd"):
         _need("meshio", name, "meshes")
     if name == "--plot":
         _check_format(value)

@@ -20,6 +20,7 @@ from typing import TYPE_CHECKING, Any
 
 import typer
 
+from enumsol.cli.decks import options_said
 from enumsol.cli.streams import is_quiet, pour, say
 from enumsol.errors import InvalidArgumentError, MissingDependencyError, OutputError
 from enumsol.support.files import write_file
@@ -106,6 +107,18 @@ def check_places(path: str | None, problem: AnyProblem, name: str) -> None:
         raise InvalidArgumentError(f"--vtu is given, but {name} has neither mesh nor coordinates; expected one of them")
 
 
+def check_mesh(path: str | None, problem: AnyProblem, name: str) -> None:
+    """Refuse files for CGX of a problem that has no mesh, before the search.
+
+    Raises
+    ------
+    InvalidArgumentError
+        The problem, which is called ``name``, has no mesh.
+    """
+    if path is not None and problem.mesh is None:
+        raise InvalidArgumentError(f"--frd is given, but {name} has no mesh; expected a problem made of one")
+
+
 def check_scripts(path: str | None, problem: AnyProblem) -> None:
     """Refuse a page that plotly's script draws, before the search.
 
@@ -125,7 +138,7 @@ def checking_commands(proven: bool, source: str | None, command: str, place: str
     """
     if not proven or source is None:
         return []
-    problem, file = shlex.quote(source), f"{command}.proof" if proof is None else shlex.quote(proof)
+    problem, file = shlex.quote(source) + options_said(), f"{command}.proof" if proof is None else shlex.quote(proof)
     verify = f"enumsol verify {problem} {file}"
     return [verify] if proof is not None else [f"enumsol {command} {problem} {place} --proof {file}", verify]
 

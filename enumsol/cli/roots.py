@@ -12,7 +12,7 @@ from enumsol.cli import common, options, output
 from enumsol.cli.output import plain, taken
 from enumsol.cli.progress import search_display
 from enumsol.errors import InvalidArgumentError
-from enumsol.support.messages import counted, visible
+from enumsol.support.messages import counted, listed, visible
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -56,6 +56,7 @@ class Search:
     json_file: options.OutputFile | None = None
     csv_file: options.OutputFile | None = None
     vtu_file: options.OutputFile | None = None
+    frd_file: options.OutputFile | None = None
     report_file: options.OutputFile | None = None
     units: options.Units | None = None
 
@@ -90,11 +91,13 @@ class Search:
         problem was made of, where it was not read from ``source``.
         """
         output.check_places(self.vtu_file, problem, name)
+        output.check_mesh(self.frd_file, problem, name)
         output.check_scripts(self.report_file, problem)
         units = common.units_of(name, self.units)
         found, ended = common.so_far(lambda: self._found(problem, alpha))
         output.deliver(
-            (self.vtu_file, lambda path: _write_vtu(problem, found, path)),
+            (self.vtu_file, lambda path: _write_states(problem, found, path, "--vtu")),
+            (self.frd_file, lambda path: _write_states(problem, found, path, "--frd")),
             (self.report_file, lambda path: self._write_page(found, path, name, source, scene)),
             json_file=self.json_file,
             csv_file=self.csv_file,
@@ -102,11 +105,12 @@ class Search:
             content=lambda: roots_as_json(found, name),
             frame=found.to_frame,
         )
-        partly = [name for name, path in (("the CSV", self.csv_file), ("--vtu", self.vtu_file)) if path is not None]
+        outputs = (("the CSV", self.csv_file), ("--vtu", self.vtu_file), ("--frd", self.frd_file))
+        partly = [name for name, path in outputs if path is not None]
         if partly and found.families:
             families = counted(len(found.families), "family", "families")
             holds = "hold" if len(partly) > 1 else "holds"
-            common.note(f"{' and '.join(partly)} {holds} the isolated roots only, --json the {families} too")
+            common.note(f"{listed(partly)} {holds} the isolated roots only, --json the {families} too")
         common.finish(ended, common.ExitStatus.DONE if self.unique and found.unique is not None else _status(found))
 
     def _write_page(self, found: RootSet, path: str, name: str, source: str | None, scene: Scene | None) -> None:
@@ -136,7 +140,9 @@ class Search:
 
 
 @options.with_options(*options.options_of(Search), after=2)
-def roots(problem: options.Problem, alpha: options.Number, *, quiet: options.Quiet = False, **chosen: Any) -> None:
+def roots(
+    problem: options.Problem, alpha: options.Number | None = None, *, quiet: options.Quiet = False, **chosen: Any
+) -> None:
     """Find all solutions of PROBLEM at one ALPHA.
 
     Prints a table of the roots and whether it is complete; lambda_n and lambda_t are nodal forces, not pressures. The
@@ -149,21 +155,24 @@ def roots(problem: options.Problem, alpha: options.Number, *, quiet: options.Qui
 
     Parameters
     ----------
-    alpha : Parameter value: a decimal number, read as float64, or a fraction such as 8/3, taken exactly.
+    alpha : Parameter value: a decimal number, read as float64, or a fraction such as 8/3, taken exactly; required if
+        friction or load depend on it.
     """
     search = Search(**chosen)
     search.check()
-    value = common.parse_alpha(alpha)
-    search.answer(problem, common.load_problem(problem), value, problem)
+    if alpha is not None:
+        common.parse_alpha(alpha)  # before the problem is read
+    body = common.load_problem(problem)
+    search.answer(problem, body, common.alpha_of(alpha, problem, body), problem)
 
 
-def _write_vtu(problem: AnyProblem, found: RootSet, path: str) -> None:
+def _write_states(problem: AnyProblem, found: RootSet, path: str, option: str) -> None:
     if not len(found):
-        common.note("--vtu: no isolated root was found, so no file is written for ParaView")
+        common.note(f"{option}: no isolated root was found, so no file is written")
         return
-    from enumsol.io.vtu import write_vtu  # numpy: not for --help
+    from enumsol.io import calculix, vtu  # numpy: not for --help
 
-    write_vtu(problem, found, path)
+    (vtu.write_vtu if option == "--vtu" else calculix.write_frd)(problem, found, path)
 
 
 def _status(found: RootSet) -> common.ExitStatus:

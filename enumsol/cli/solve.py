@@ -7,7 +7,8 @@ from typing import TYPE_CHECKING, Annotated, Any, NamedTuple
 
 import typer
 
-from enumsol.cli.common import GALLERY, TOML, note, parse_alpha, refuse_misspelt, units_of
+from enumsol.cli.common import GALLERY, TOML, note, parse_alpha, refuse_misspelt, scene_of, units_of
+from enumsol.cli.decks import is_deck
 from enumsol.cli.options import LIMITS, OUTPUT, Argument, OutputFile, OutputFlag, Quiet, options_of, with_options
 from enumsol.cli.output import deliver, write_figure
 from enumsol.cli.progress import Display
@@ -70,7 +71,7 @@ def _as_given(text: str, option: str) -> str:
 
 
 def _entry(part: str, option: str, text: str) -> Any:
-    if part.strip() == "free" and option == "--displacement":
+    if part.strip() == "free" and option.startswith("--displacement"):
         return "free"
     try:
         return float(part)
@@ -133,6 +134,7 @@ MESH_OPTIONS = {
     "clamp": Given(_SUPPORT, "NAME", _as_given),
     "symmetry": Given(_SUPPORT, "NAME", _as_given),
     "displacement": Given(_SUPPORT, "NAME=ux,uy[,uz]", _numbers),
+    "displacement_slope": Given(_SUPPORT, "NAME=ux,uy[,uz]", _numbers),
     "spring": Given(_SUPPORT, "NAME=kn,kt", _numbers),
     "max_rigid_displacement": Given(_SUPPORT, "LENGTH|auto", _auto_or_number, False),
     "load": Given(_LOAD, _PULL, _numbers),
@@ -140,6 +142,9 @@ MESH_OPTIONS = {
     "pressure": Given(_LOAD, "NAME=P", _number),
     "pressure_slope": Given(_LOAD, "NAME=P", _number),
     "body_force": Given(_LOAD, "[NAME=]fx,fy[,fz]", _numbers),
+    "body_force_slope": Given(_LOAD, "[NAME=]fx,fy[,fz]", _numbers),
+    "force": Given(_LOAD, _PULL, _numbers),
+    "force_slope": Given(_LOAD, _PULL, _numbers),
 }
 
 
@@ -175,7 +180,8 @@ def solve(
     """Build a contact problem from MESH and find all its solutions.
 
     A .toml file holds the same options under the same names (`load_slope`, not `--load-slope`), and `mesh`. All other
-    commands accept such files as PROBLEM, and also the files that --output writes. Without --alpha, a problem that
+    commands accept such files as PROBLEM, and also the files that --output writes. So they do decks of CalculiX and
+    Abaqus with materials, contact and steps (.inp), which need no options here either. Without --alpha, a problem that
     depends on alpha is written but not solved. With --dry-run, what was understood is printed.
 
     Exit status: as enumsol roots.
@@ -203,6 +209,7 @@ def solve(
     clamp : Part that is held; may be repeated.
     symmetry : Part on a plane of symmetry, or on rollers.
     displacement : Prescribed displacements; `free` for a component that is not prescribed.
+    displacement_slope : The same, times alpha.
     spring : Springs per area, along the normal and along the tangents.
     max_rigid_displacement : Let bodies that only contact holds move as a whole, by at most this length; auto: 10 times
         the mesh's size.
@@ -211,6 +218,9 @@ def solve(
     pressure : Force per area into the body.
     pressure_slope : The same, times alpha.
     body_force : Force per volume, such as the weight, by parts of the body.
+    body_force_slope : The same, times alpha.
+    force : Force on each node of a part or set of nodes, in 2D of the whole thickness.
+    force_slope : The same, times alpha.
     alpha : Parameter value: a number, or a fraction such as 8/3; required if friction or load depend on it.
     output : Write the problem for the other commands: .npz, .h5, or a new directory.
     dry_run : Print what was understood: bodies, parts, loads, contact nodes, rigid modes. Nothing is solved.
@@ -246,12 +256,12 @@ def solve(
         if output is not None:
             return
         raise InvalidArgumentError("--alpha is missing, on which friction or load depend; expected it, or --output")
-    source = output if output is not None else mesh if mesh.endswith(TOML) else None
+    source = output if output is not None else mesh if mesh.endswith(TOML) or (is_deck(mesh) and not given) else None
     search.answer(mesh, problem, value or 0.0, source, scene)
 
 
 def _scene(mesh: str, options: dict[str, Any]) -> Scene:
-    """Scene that the mesh and the options, or a TOML file, describe."""
+    """Scene that the mesh and the options, or a TOML file or a deck, describe."""
     from enumsol import fem  # numpy: not for --help
     from enumsol.fem.conditions import refuse_old_friction
     from enumsol.fem.mesh_problems import check_keys
@@ -264,7 +274,9 @@ def _scene(mesh: str, options: dict[str, Any]) -> Scene:
             flag = _flags(next(iter(options)))[0]
             raise InvalidArgumentError(f"{flag} is given beside {mesh}, which has all options; expected it there")
         refuse_misspelt(mesh)
-        return fem.read_mesh_scene(mesh)
+    whole = scene_of(mesh) if mesh.endswith(TOML) or (is_deck(mesh) and not options) else None
+    if whole is not None:
+        return whole
     place = file_path(mesh, "MESH", "the name of a mesh file")
     if place.suffix in SUFFIXES or mesh.startswith(GALLERY):
         raise InvalidArgumentError(f"{mesh} is a problem; expected a mesh (enumsol roots {mesh} solves a problem)")

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import typer
 
@@ -26,10 +26,15 @@ _NAMES = {
     "with_slip_minus": "slip-",
     "with_slip": "slip",
     "index_sum": "index sum",
+    "left_out": "left out",
+    "stability_undecided": "may run away",
 }
 #: Columns that count solutions; a row whose search was cut short shows what it found as a lower bound.
 _COUNTS = ("roots", "families", "open", "stick", "slip+", "slip-", "slip")
 _CAPTION = "{}: how many of the roots have a node in that status"
+_LEFT_OUT = (
+    "left out: how many roots run away, and are not counted; may run away: how many that are counted are undecided"
+)
 _FIRST, _LAST = "first alpha", "last alpha"
 _RUNS_CAPTION = "each row stands for all alphas tried from the first to the last, which have equal counts"
 
@@ -41,6 +46,7 @@ def table(
     samples: Annotated[int, typer.Option(min=2, metavar="N")] = 21,
     alphas: Annotated[str | None, typer.Option(metavar="LIST")] = None,
     arithmetic: Arithmetic = "verified",
+    without: Annotated[Literal["running away"] | None, typer.Option()] = None,
     max_nodes: Count | None = None,
     time_limit: Seconds | None = None,
     jobs: Count = 1,
@@ -53,9 +59,9 @@ def table(
     A table does not show what happens between the alphas; enumsol graph does.
 
     Exit status: 0 if the result is complete at every alpha (in fast arithmetic, which proves nothing: if every search
-    ran to its end with nothing undecided); 3 if something remained undecided or the indices do not add up to +1
-    somewhere; 2 on bad input; 130 on Ctrl-C, after printing what was done so far; 74 if a result could not be written;
-    141 if the program that read it has ended.
+    ran to its end with nothing undecided); 3 if something remained undecided, such as whether a root runs away if that
+    was asked for, or the indices do not add up to +1 somewhere; 2 on bad input; 130 on Ctrl-C, after printing what was
+    done so far; 74 if a result could not be written; 141 if the program that read it has ended.
 
     Parameters
     ----------
@@ -64,13 +70,14 @@ def table(
     samples : Number of evenly spaced alphas, including both ends.
     alphas : A list of alphas instead, such as 1,2.5,8/3.
     arithmetic : Arithmetic of each enumeration, as in enumsol roots.
+    without : Leave out roots that are proven to run away; PROBLEM has a mesh or a mass.
     max_nodes : Largest number of nodes of the tree at one alpha.
     time_limit : Longest time of the search at one alpha.
     jobs : Number of processes, each of which searches one alpha at a time.
     csv_file : Write a table with one row per alpha; - is stdout.
     """
     values, body = _alphas(first, last, samples, alphas), load_problem(problem)
-    limits = {"max_nodes": max_nodes, "time_limit": time_limit}
+    limits = {"max_nodes": max_nodes, "time_limit": time_limit, "without": without}
     options = {name: limit for name, limit in limits.items() if limit is not None}
     frame, ended = so_far(lambda: _search(body, values, arithmetic, jobs, options))
     deliver(
@@ -118,7 +125,12 @@ def _content(frame: pd.DataFrame, alphas: list[Alpha], ended: EnumsolError | Non
 def _open(frame: pd.DataFrame) -> pd.DataFrame:
     """Rows at which the search was cut short, something is undecided, or the indices show that something is missing."""
     missing = frame["index_sum"].notna() & frame["index_sum"].ne(1) if frame.attrs["held"] else False
-    return frame[_gaps(frame) | missing]
+    return frame[_gaps(frame) | missing | _may_run_away(frame)]
+
+
+def _may_run_away(frame: pd.DataFrame) -> pd.Series[bool]:
+    """True in rows with roots that are counted and may run away."""
+    return frame.get("stability_undecided", 0 * frame["roots"]).gt(0)
 
 
 def _gaps(frame: pd.DataFrame) -> pd.Series[bool]:
@@ -138,7 +150,8 @@ def _as_text(frame: pd.DataFrame, asked: int, ended: EnumsolError | None) -> str
                 continue
             shown[name] = shown[name].astype(str).where(~_gaps(frame), ">=" + shown[name].astype(str))
     shown["complete"] = ["yes" if value else "no" for value in shown["complete"]]
-    captions = [_CAPTION.format(", ".join(name for name in _COUNTS[2:] if name in shown))]
+    captions = [_LEFT_OUT] if "left out" in shown else []
+    captions += [_CAPTION.format(", ".join(name for name in _COUNTS[2:] if name in shown))]
     if len(shown) > 40:  # printed as runs of equal counts
         shown = _runs(shown)
         captions.append(_RUNS_CAPTION)

@@ -8,12 +8,12 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
-from itertools import combinations
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from enumsol.auditing.known_solutions import KnownSolutions
 from enumsol.collection.entries import COLLECTION, INDEX, CertifiedSolutions, CollectionEntry, get
 from enumsol.collection.reports import CollectionReport, JudgedSolution, ProblemReport
 from enumsol.errors import InvalidArgumentError, MissingDependencyError
@@ -90,7 +90,7 @@ def _compared(entry: CollectionEntry, submissions: list[Submission], tolerance: 
     problem, certified = entry.problem(), entry.certified()
     judged: list[JudgedSolution] = []
     for submission in submissions:
-        known = KnownSolutions(problem, certified, displacements=submission.displacements)
+        known = _known(problem, certified, displacements=submission.displacements)
         known.check_apart(tolerance, entry.name)
         for row, values in enumerate(submission.values):
             nearest, distance = known.nearest(values)
@@ -100,85 +100,19 @@ def _compared(entry: CollectionEntry, submissions: list[Submission], tolerance: 
     return ProblemReport(entry, certified, tuple(judged))
 
 
-class KnownSolutions:
-    """The certified solutions of a problem as forces or as displacements.
+def _known(problem: Problem, certified: CertifiedSolutions, *, displacements: bool) -> KnownSolutions:
+    """Certified solutions as forces, or as displacements."""
 
-    Forces are measured by the largest one of all solutions, as that of an open one is zero; displacements by those of
-    the solution itself, as a body that is free may move many times as far as one that is held.
-
-    Parameters
-    ----------
-    problem : ContactProblem or ContactProblem3D
-    certified : CertifiedSolutions
-    displacements : bool
-        They are compared by their displacements.
-    """
-
-    def __init__(self, problem: Problem, certified: CertifiedSolutions, *, displacements: bool) -> None:
-        self._problem, self._displacements = problem, displacements
-        roots = {("root", k): [self._values(root[None])] for k, root in enumerate(certified.roots)}
-        families = {("family", k): list(map(self._values, parts)) for k, parts in enumerate(certified.families)}
-        known = roots | families
-        sizes = {name: max(float(np.max(np.abs(part))) for part in parts) for name, parts in known.items()}
-        largest = max(sizes.values()) or 1.0
-        self._known = known
-        self._sizes = {name: (size or largest) if displacements else largest for name, size in sizes.items()}
-
-    def _values(self, forces: Floats) -> Floats:
+    def values(forces: Floats) -> Floats:
         """Points of shape (k, m) of forces (k, p, d)."""
-        if not self._displacements:
+        if not displacements:
             return forces.reshape(len(forces), -1)
         # the rows of the problem: all normal forces, then the tangential ones by their axes
-        return np.array([self._problem.condensed.displacement(0, point.T.ravel()) for point in forces])
+        return np.array([problem.condensed.displacement(0, point.T.ravel()) for point in forces])
 
-    def nearest(self, values: Floats) -> tuple[tuple[str, int] | None, float]:
-        """The nearest solution, as ("root", k) or ("family", k), and its distance; None for values that are not finite.
-
-        Parameters
-        ----------
-        values : (m,) array
-        """
-        if not np.all(np.isfinite(values)):
-            return None, np.inf
-        distances = {name: self._distance(name, [values[None]], self._sizes[name]) for name in self._known}
-        name = min(distances, key=distances.__getitem__)
-        return name, distances[name]
-
-    def check_apart(self, tolerance: float, name: str) -> None:
-        """Refuse a tolerance at which one answer could be two solutions.
-
-        Raises
-        ------
-        InvalidArgumentError
-            It is not below half of the least distance between two solutions.
-        """
-        for one, other in combinations(self._known, 2):
-            least = self._distance(one, self._known[other], max(self._sizes[one], self._sizes[other]))
-            if not tolerance < least / 2:
-                raise InvalidArgumentError(
-                    f"tolerance is {tolerance:g}, but {' '.join(map(str, one))} and {' '.join(map(str, other))} of "
-                    f"{name} are only {least:.2g} apart; expected less than half of that"
-                )
-
-    def _distance(self, name: tuple[str, int], others: list[Floats], size: float) -> float:
-        """Least distance of a solution from the convex hulls of others, in parts of a size."""
-        return min(hull_distance(part / size, other / size) for part in self._known[name] for other in others)
-
-
-def hull_distance(first: Floats, second: Floats) -> float:
-    """Least distance, in the largest component, of the convex hulls of points, (k, m) and (l, m)."""
-    if len(first) == len(second) == 1:
-        return float(np.max(np.abs(first - second)))
-    from scipy.optimize import linprog  # for continua only
-
-    # weights of both hulls and the distance t: |first' v - second' w| <= t, and t is least
-    difference = np.hstack([first.T, -second.T])
-    bound = -np.ones((len(difference), 1))
-    sums = np.zeros((2, len(first) + len(second) + 1))
-    sums[0, : len(first)] = sums[1, len(first) : -1] = 1.0
-    rows = np.vstack([np.hstack([difference, bound]), np.hstack([-difference, bound])])
-    cost = np.append(np.zeros(len(first) + len(second)), 1.0)
-    return float(linprog(cost, rows, np.zeros(len(rows)), sums, np.ones(2)).fun)
+    roots = [values(root[None]) for root in certified.roots]
+    families = [list(map(values, parts)) for parts in certified.families]
+    return KnownSolutions(roots, families, each_by_itself=displacements)
 
 
 def _reason(problem: Problem, submission: Submission, values: Floats) -> str:

@@ -12,6 +12,7 @@ plain arrays::
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any, cast
 
 import numpy as np
@@ -285,7 +286,7 @@ def contact_problem(
         slip_offset=slip_offset,
         node_ids=[int(node) for node in touching] if node_ids is None else node_ids,
         coordinates=nodes[touching],
-        mesh=lambda left: BodyMesh.of_dofs(nodes, bodies, left, lame=lame),
+        mesh=lambda motion, _: BodyMesh(nodes, bodies, motion, lame=lame),
     )
     return cast("ContactProblem", problem)
 
@@ -374,7 +375,7 @@ def basis_contact_problem(
         )
     fixed = _held(held, dofs.size)
     moved = np.where(fixed, _vector(displacements, "displacements", dofs.size), 0.0)
-    supports = Supports(fixed[dofs], moved[dofs], np.zeros(dofs.shape, dtype=bool))
+    supports = replace(Supports.none(dofs.shape), fixed=fixed[dofs], values=moved[dofs])
     facets = _facets(basis.mesh, contact)
     touching = _touching(basis, facets, dofs)
     _check_pressed(basis, facets, dofs, touching)

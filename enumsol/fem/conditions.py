@@ -62,12 +62,16 @@ class Options:
     clamp: Names
     symmetry: Names
     displacement: Mapping[str, Sequence[Any]] | None
+    displacement_slope: Mapping[str, Sequence[Any]] | None
     spring: Vectors
     load: Vectors
     load_slope: Vectors
     pressure: Mapping[str, float] | None
     pressure_slope: Mapping[str, float] | None
     body_force: ArrayLike | Mapping[str, ArrayLike] | None
+    body_force_slope: ArrayLike | Mapping[str, ArrayLike] | None
+    force: Vectors
+    force_slope: Vectors
     gap: float | Mapping[str, float]
     obstacle: Mapping[str, Sequence[float]] | None
     max_rigid_displacement: float | Literal["auto"] | None
@@ -192,10 +196,10 @@ def supports_of(mesh: PartedMesh, options: Options) -> Supports:
         One names no part or is not of its form, or they contradict each other.
     """
     shape = mesh.points.shape
-    found = Supports(np.zeros(shape, dtype=bool), np.zeros(shape), np.zeros(shape, dtype=bool))
+    found = Supports.none(shape)
     for part in names_of(options.clamp, "clamp"):
         for component in range(shape[1]):
-            _fix(found, part, mesh.nodes(part), component, 0.0)
+            _fix(found, part, mesh.nodes(part), component)
     for part in names_of(options.symmetry, "symmetry"):
         nodes = mesh.nodes(part)
         flat = _flat(mesh, nodes)
@@ -205,15 +209,27 @@ def supports_of(mesh: PartedMesh, options: Options) -> Supports:
                 f"symmetry {part} lies in {where} perpendicular to an axis; expected a part of the boundary in one "
                 "such plane"
             )
-        _fix(found, part, nodes, flat[0], 0.0)
+        _fix(found, part, nodes, flat[0])
         found.mirrored[nodes, flat[0]] = True
-    for part, value in by_part(options.displacement, "displacement").items():
-        nodes, given = mesh.nodes(part), _components(value, f"displacement of {part}", shape[1])
-        for component, entry in given.items():
-            _fix(found, part, nodes, component, entry)
+    for part, given in displacements_of(options, shape[1]).items():
+        nodes = mesh.nodes(part)
+        for component, (value, slope) in given.items():
+            _fix(found, part, nodes, component, value, slope)
         # rollers in a plane are a plane of symmetry, however they are given
-        if len(given) == 1 and 0.0 in given.values() and _flat(mesh, nodes) == [*given]:
+        if len(given) == 1 and (0.0, 0.0) in given.values() and _flat(mesh, nodes) == [*given]:
             found.mirrored[nodes, next(iter(given))] = True
+    return found
+
+
+def displacements_of(options: Options, dimension: int) -> dict[str, dict[int, tuple[float, float]]]:
+    """Given displacements of parts by components, each at alpha = 0 and its derivative; one not given is 0."""
+    found: dict[str, dict[int, tuple[float, float]]] = {}
+    for k, name in enumerate(("displacement", "displacement_slope")):
+        for part, value in by_part(getattr(options, name), name).items():
+            for component, entry in _components(value, f"{name} of {part}", dimension).items():
+                both = [*found.setdefault(part, {}).get(component, (0.0, 0.0))]
+                both[k] = entry
+                found[part][component] = (both[0], both[1])
     return found
 
 
@@ -236,17 +252,20 @@ def _flat(mesh: PartedMesh, nodes: Integers) -> list[int]:
     return np.flatnonzero(np.ptp(mesh.points[nodes], axis=0) <= SAME * extent).tolist()
 
 
-def _fix(supports: Supports, part: str, nodes: Integers, component: int, value: float) -> None:
-    fixed, values = supports.fixed, supports.values
-    differ = fixed[nodes, component] & (values[nodes, component] != value)
-    if np.any(differ):
-        node = int(nodes[np.argmax(differ)])
-        raise InvalidArgumentError(
-            f"{part} moves node {node} by {value:g} in {'xyz'[component]}, and another part that shares it by "
-            f"{values[node, component]:g}; expected one displacement"
-        )
+def _fix(
+    supports: Supports, part: str, nodes: Integers, component: int, value: float = 0.0, slope: float = 0.0
+) -> None:
+    fixed = supports.fixed
+    for array, own, times in ((supports.values, value, ""), (supports.slopes, slope, " alpha")):
+        differ = fixed[nodes, component] & (array[nodes, component] != own)
+        if np.any(differ):
+            node = int(nodes[np.argmax(differ)])
+            raise InvalidArgumentError(
+                f"{part} moves node {node} by {own:g}{times} in {'xyz'[component]}, and another part that shares it by "
+                f"{array[node, component]:g}{times}; expected one displacement"
+            )
+        array[nodes, component] = own
     fixed[nodes, component] = True
-    values[nodes, component] = value
 
 
 @dataclass(frozen=True)
@@ -365,6 +384,36 @@ def rigid_motions(places: Floats) -> Floats:
 
 
 # -- loads and springs -----------------------------------------------------------------------------------------------
+
+
+def nodal_forces(body: NodalBasis, mesh: PartedMesh, options: Options, slope: str = "") -> Floats:
+    """Forces on all nodes, (N, d), of everything that acts on parts; with ``slope`` "_slope" their derivatives."""
+    loads, pressures, volume, forces = (
+        getattr(options, name + slope) for name in ("load", "pressure", "body_force", "force")
+    )
+    total = part_forces(body, mesh, loads, pressures, slope)
+    if volume is not None:
+        total += body.volume_forces(body_force_of(mesh, volume, f"body_force{slope}"))
+    for part, value in by_part(forces, f"force{slope}").items():
+        total[mesh.nodes(part)] += short_vector(value, f"force{slope} of {part}", mesh.points.shape[1])
+    return total
+
+
+def body_force_of(mesh: PartedMesh, value: object, name: str) -> Floats:
+    """Force per volume of every cell, (M, d); parts of the body without one have none [force / length^3].
+
+    Raises
+    ------
+    InvalidArgumentError
+        It is not that, or a name does not exist.
+    """
+    dimension = mesh.points.shape[1]
+    if not isinstance(value, Mapping):
+        return np.tile(short_vector(value, name, dimension), (len(mesh.cells), 1))
+    density = np.zeros((len(mesh.cells), dimension))
+    for part, force in by_part(value, name).items():
+        density[mesh.body(part)] += short_vector(force, f"{name} of {part}", dimension)
+    return density
 
 
 def part_forces(body: NodalBasis, mesh: PartedMesh, loads: object, pressures: object, slope: str = "") -> Floats:

@@ -1,4 +1,4 @@
-"""Meshes of bodies from files of mesh generators, read by meshio.
+"""Meshes of bodies from files of mesh generators, read by meshio, and from decks.
 
 By meshio's names of cells it is decided which of a file's cells are the body, and which are its facets.
 """
@@ -17,7 +17,8 @@ from typing import TYPE_CHECKING, Any, cast
 import numpy as np
 
 from enumsol.errors import InvalidArgumentError, MissingDependencyError
-from enumsol.fem.file_counts import Deck, deck_of, refuse_partial
+from enumsol.fem.deck_meshes import DeckMesh, deck_mesh
+from enumsol.fem.file_counts import refuse_partial
 from enumsol.fem.meshes import ALL, SAME, PartedMesh, SolidMesh, positions
 from enumsol.model.cells import KINDS, TRIANGLES, as_quadrilaterals, boundary_facets, facet_rows, numbers_of_nodes
 from enumsol.support.arguments import file_path, shown
@@ -27,6 +28,8 @@ from enumsol.support.messages import shortened
 
 if TYPE_CHECKING:
     import meshio
+
+    from enumsol.decks.model import Deck
 
 _PHYSICAL = "gmsh:physical"
 #: What meshio calls the families of a MED file, of cells and of points; numbers of groups in formats without names.
@@ -106,6 +109,8 @@ def read_solid(source: str | os.PathLike[str] | Any, groups: str | None = None) 
 
 
 def _read(source: object, groups: str | None, dimension: int | None) -> PartedMesh:
+    if isinstance(source, str | os.PathLike) and Path(source).suffix.lower() == _DECK:
+        return _of_deck(file_path(source, "source"), groups, dimension)
     meshio = MissingDependencyError.imported("meshio", "Meshes in files", "meshes")
     if isinstance(source, meshio.Mesh):
         return _checked(source, groups, dimension, None, "")
@@ -132,8 +137,6 @@ def _by_meshio(meshio: ModuleType, place: Path) -> tuple[meshio.Mesh, str]:
             f"{place}: meshio needs {package} for this format, which is not installed; expected it, or another format"
         ) from error
     except (*DAMAGE, OSError, SystemExit, meshio.ReadError) as error:  # meshio may also exit
-        if place.suffix.lower() == _DECK:
-            _refuse_torn(place)
         reason = "" if isinstance(error, SystemExit) else str(error)
         if isinstance(error, LookupError):  # its text is the key alone
             reason = f"{type(error).__name__}: {reason}"
@@ -143,24 +146,32 @@ def _by_meshio(meshio: ModuleType, place: Path) -> tuple[meshio.Mesh, str]:
         ) from error
 
 
-def _refuse_torn(place: Path) -> None:
-    """Refuse a deck that meshio cannot read if parts of it are lost, and name them."""
+def _of_deck(place: Path, groups: str | None, dimension: int | None) -> PartedMesh:
+    """Mesh of a deck, which has no cell data to group by."""
+    from enumsol.decks.reading import described  # not for other files
+
     try:
-        deck_of(place, None)
-    except InvalidArgumentError:
-        raise
-    except (OSError, ValueError):
-        return  # damaged: meshio has said how
+        return _parted(deck_mesh(described(place, bare=True), spelled=True), groups, dimension)
+    except InvalidArgumentError as error:
+        raise InvalidArgumentError(f"{place}: {error}") from error
+
+
+def mesh_of_deck(deck: Deck) -> PartedMesh:
+    """Mesh of a deck with its named parts, by names in upper case.
+
+    Raises
+    ------
+    InvalidArgumentError
+        As `read_mesh`.
+    """
+    return _parted(deck_mesh(deck), None, None)
 
 
 def _checked(mesh: object, groups: str | None, dimension: int | None, place: Path | None, said: str) -> PartedMesh:
-    deck = None
     try:
-        if place is not None and place.suffix.lower() == _DECK:
-            deck = deck_of(place, mesh)
-        elif place is not None:
+        if place is not None:
             refuse_partial(place, mesh, said)
-        return _parted(mesh, groups, dimension, deck)
+        return _parted(mesh, groups, dimension)
     except InvalidArgumentError:
         raise
     except (IndexError, KeyError, OverflowError, TypeError, ValueError) as error:  # what meshio does not check
@@ -168,14 +179,13 @@ def _checked(mesh: object, groups: str | None, dimension: int | None, place: Pat
         raise InvalidArgumentError(f"the arrays of the mesh do not fit together ({reason})") from error
 
 
-def _parted(mesh: meshio.Mesh, groups: str | None, dimension: int | None, deck: Deck | None) -> PartedMesh:
+def _parted(mesh: meshio.Mesh | DeckMesh, groups: str | None, dimension: int | None) -> PartedMesh:
     kinds = list(dict.fromkeys(block.type for block in mesh.cells))
     if dimension is None:
         spatial = any(kind.startswith(("tetra", "hexa", "wedge", "pyramid", "polyhedron")) for kind in kinds)
         dimension = 3 if spatial else 2
     bodies, facet = body_kinds(kinds, dimension)
-    types = () if deck is None else deck.types(bodies, mesh)
-    labels = None if deck is None else deck.labels(bodies, mesh)
+    types, labels = (tuple(mesh.types), mesh.labels(bodies)) if isinstance(mesh, DeckMesh) else ((), None)
     cells = body_cells(mesh, bodies)
     used = np.unique(cells)
     if len(used) and not 0 <= used[0] <= used[-1] < len(mesh.points):
@@ -197,7 +207,7 @@ def _parted(mesh: meshio.Mesh, groups: str | None, dimension: int | None, deck: 
     if facet == "quad8":
         facets = {name: with_centres(rows, inside, name) for name, rows in facets.items()}
     found, sets = facets_of_sets(dimension, inside, sets, len(used))
-    facets = facets or found
+    facets = {**found, **facets} if isinstance(mesh, DeckMesh) else facets or found
     if not facets:
         raise InvalidArgumentError(
             f"the mesh has no contact facets: no {facet} cells on its boundary; "

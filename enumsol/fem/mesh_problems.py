@@ -23,7 +23,6 @@ from enumsol.fem.meshes import PartedMesh, lame
 from enumsol.fem.scene_checks import refuse_overlaps, refuse_pairs, refuse_walls, scene_notes
 from enumsol.fem.scenes import Scene
 from enumsol.support.arguments import file_path, finite_number, one_of, positive_number, shown, text_of
-from enumsol.support.array_arguments import short_vector
 from enumsol.support.files import unreadable
 from enumsol.support.messages import shortened
 from enumsol.support.plotting import checked_units
@@ -59,10 +58,7 @@ def scene_of(source: PartedMesh | str | os.PathLike[str] | Any, options: Options
     held = conditions.supports_of(mesh, options)
     masses = masses_of(mesh, options.density, thickness)
     contacts = contacts_of(body, mesh, options, held)
-    forces = conditions.part_forces(body, mesh, options.load, options.pressure)
-    if options.body_force is not None:
-        forces = forces + body.volume_forces(body_force_of(mesh, options.body_force))
-    slope = conditions.part_forces(body, mesh, options.load_slope, options.pressure_slope, "_slope")
+    forces, slope = (conditions.nodal_forces(body, mesh, options, which) for which in ("", "_slope"))
     springs, pieces = conditions.part_springs(body, mesh, options.spring), conditions.pieces_of(mesh)
     scene = Scene(mesh, options, body, held, contacts, forces, slope, springs, coefficients, pieces, masses)
     refuse_overlaps(scene)
@@ -138,23 +134,6 @@ def masses_of(mesh: PartedMesh, density: object, thickness: Floats | None) -> Fl
     return np.asarray(np.broadcast_to(given, len(mesh.cells)) * (1.0 if thickness is None else thickness))
 
 
-def body_force_of(mesh: PartedMesh, value: object) -> Floats:
-    """Force per volume of every cell, (M, d); parts of the body without one have none [force / length^3].
-
-    Raises
-    ------
-    InvalidArgumentError
-        It is not that, or a name does not exist.
-    """
-    dimension = mesh.points.shape[1]
-    if not isinstance(value, Mapping):
-        return np.tile(short_vector(value, "body_force", dimension), (len(mesh.cells), 1))
-    density = np.zeros((len(mesh.cells), dimension))
-    for part, force in conditions.by_part(value, "body_force").items():
-        density[mesh.body(part)] += short_vector(force, f"body_force of {part}", dimension)
-    return density
-
-
 def _of_cells(mesh: PartedMesh, value: object, name: str, read: Callable[[Any, str], T]) -> T | list[T]:
     """A value of all cells, or a list of one for each if it is given by names of parts of the body."""
     if not isinstance(value, Mapping):
@@ -202,12 +181,16 @@ def mesh_problem(
     clamp: Names = (),
     symmetry: Names = (),
     displacement: Mapping[str, Sequence[Any]] | None = None,
+    displacement_slope: Mapping[str, Sequence[Any]] | None = None,
     spring: Vectors = None,
     load: Vectors = None,
     load_slope: Vectors = None,
     pressure: Mapping[str, float] | None = None,
     pressure_slope: Mapping[str, float] | None = None,
     body_force: ArrayLike | Mapping[str, ArrayLike] | None = None,
+    body_force_slope: ArrayLike | Mapping[str, ArrayLike] | None = None,
+    force: Vectors = None,
+    force_slope: Vectors = None,
     gap: float | Mapping[str, float] = 0.0,
     obstacle: Mapping[str, Sequence[float]] | None = None,
     max_rigid_displacement: float | Literal["auto"] | None = None,
@@ -262,16 +245,21 @@ def mesh_problem(
         Parts that are held in all components.
     symmetry : name or names
         Parts in planes perpendicular to an axis, held in the direction of that axis: planes of symmetry, rollers.
-    displacement : mapping of names to components
-        Given displacements in x, y (and z), each a number [length], or ``"free"`` or None where it is not given.
+    displacement, displacement_slope : mapping of names to components
+        Given displacements in x, y (and z), and their derivatives with respect to alpha, each a number [length], or
+        ``"free"`` or None where it is not given. With a slope the last entry of u is alpha.
     spring : mapping of names to (kn, kt)
         Springs to the ground along the normal and across it, per area (in 2D per length) [force / length^3].
     load, load_slope : mapping of names to vectors
         Force per area (in 2D per length) in x, y (and z), and its derivative with respect to alpha [force / length^2].
     pressure, pressure_slope : mapping of names to float
         Force per area along the inward normal, and its derivative with respect to alpha [force / length^2].
-    body_force : vector, or mapping of names to vectors, optional
-        Force per volume, such as the weight, on the whole body or on parts of it [force / length^3].
+    body_force, body_force_slope : vector, or mapping of names to vectors, optional
+        Force per volume, such as the weight, on the whole body or on parts of it, and its derivative with respect to
+        alpha [force / length^3].
+    force, force_slope : mapping of names to vectors
+        Force on each node of a part or set of nodes in x, y (and z), in 2D of the whole thickness, and its derivative
+        with respect to alpha [force].
     gap : float, or mapping of names to float
         Initial gap along the normals, for all contact nodes or, like friction, by parts (0 for parts that are not
         named), in addition to the distance to the obstacle or within a pair; a negative gap is a press fit [length].
@@ -314,8 +302,10 @@ def mesh_problem(
     given = Options(
         young=young, poisson=poisson, contact=contact, pairs=pairs, plane=plane, thickness=thickness, density=density,
         friction=friction, friction_slope=friction_slope, friction2=friction2, friction2_slope=friction2_slope,
-        axis=axis, clamp=clamp, symmetry=symmetry, displacement=displacement, spring=spring,
+        axis=axis, clamp=clamp, symmetry=symmetry, displacement=displacement,
+        displacement_slope=displacement_slope, spring=spring,
         load=load, load_slope=load_slope, pressure=pressure, pressure_slope=pressure_slope, body_force=body_force,
+        body_force_slope=body_force_slope, force=force, force_slope=force_slope,
         gap=gap, obstacle=obstacle, max_rigid_displacement=max_rigid_displacement, groups=groups,
     )  # fmt: skip
     return scene_of(mesh, given).problem()

@@ -1,14 +1,14 @@
-"""What holds a body: degrees of freedom with given displacements are eliminated, or set apart at contact nodes.
+"""What holds a body: given displacements and linear equations are eliminated, or set apart at contact nodes.
 
 A contact row needs both components of its node. Where one of them is held at zero, as on a plane of symmetry, it stays
 in the problem as a degree of freedom of its own that nothing moves: it is uncoupled from the body, its displacement is
-zero in every solution, and so is the tangential force along it. All builders of contact problems in 2D and 3D end in
-`problem_of`.
+zero in every solution, and so is the tangential force along it. Displacements that grow with alpha leave one degree of
+freedom that is alpha. All builders of contact problems in 2D and 3D end in `problem_of`.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from itertools import combinations
 from typing import TYPE_CHECKING, Any
 
@@ -16,13 +16,15 @@ import numpy as np
 import scipy.sparse as sp
 
 from enumsol.errors import InvalidArgumentError
+from enumsol.fem.constraints import eliminated, followed
 from enumsol.fem.meshes import nodal_vectors, spring_stiffnesses, unit_vectors, vectors_of_all
 from enumsol.model.problem import ContactProblem
 from enumsol.support.arguments import shown
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
+    from collections.abc import Callable, Sequence
 
+    from enumsol.fem.constraints import Elimination, Equation
     from enumsol.model.mesh import BodyMesh
     from enumsol.model.problem3d import AnyProblem
     from enumsol.support.array_types import ArrayLike, Floats, Integers, Mask
@@ -31,6 +33,8 @@ if TYPE_CHECKING:
 
 #: Components of unit normals below this are rounding of a right angle.
 RIGHT_ANGLE = 1e-9
+#: Contact rows depend on each other if the least of their squared singular values is below this share of the largest.
+_DEPENDENT = 1e-12
 
 
 @dataclass(frozen=True)
@@ -42,13 +46,21 @@ class Supports:
     fixed : (N, dimension) bool array
     values : (N, dimension) array
         Displacements of the fixed components, 0 elsewhere [length].
+    slopes : (N, dimension) array
+        Their derivatives with respect to alpha.
     mirrored : (N, dimension) bool array
         Components across a plane of symmetry, where that is known.
     """
 
     fixed: Mask
     values: Floats
+    slopes: Floats
     mirrored: Mask
+
+    @classmethod
+    def none(cls, shape: tuple[int, ...]) -> Supports:
+        """No support of nodes (N, dimension)."""
+        return cls(np.zeros(shape, dtype=bool), np.zeros(shape), np.zeros(shape), np.zeros(shape, dtype=bool))
 
 
 @dataclass(frozen=True)
@@ -93,7 +105,7 @@ def movable(nodes: Integers, normals: Floats, supports: Supports, means: sp.csr_
     if not len(kept):
         raise InvalidArgumentError("contact has held nodes only; expected free ones")
     nodes, fixed, normals, means = nodes[kept], fixed[kept], normals[kept], sp.csr_array(means[kept])
-    moved = np.asarray(means @ supports.values) != 0
+    moved = (np.asarray(means @ supports.values) != 0) | (np.asarray(means @ supports.slopes) != 0)
     wrong = np.any(fixed & ((np.abs(normals) > RIGHT_ANGLE) | moved), axis=1)
     if np.any(wrong):
         raise InvalidArgumentError(
@@ -137,7 +149,11 @@ class Body:
     A, f, load_slope : as in `ContactProblem`
     supports : Supports
     dofs : (N, dimension) int array or None
-        The rows of A that the components of the nodes are; None: ``dimension node + component``.
+        The rows of A that the components of the nodes are; None: ``dimension node + component``, first.
+    equations : sequence of Equation
+        Between rows of A.
+    named : callable
+        Names of rows of A, for messages.
     """
 
     A: sp.csc_array
@@ -145,6 +161,8 @@ class Body:
     load_slope: Floats | None
     supports: Supports
     dofs: Integers | None = None
+    equations: Sequence[Equation] = ()
+    named: Callable[[int], str] = "displacement {}".format
 
     @classmethod
     def of_nodes(
@@ -166,19 +184,34 @@ class Body:
             A = sp.csc_array(A + sp.diags_array(spring_stiffnesses(springs, held.shape).ravel()))
         f = nodal_vectors(forces, "forces", held.shape)
         load_slope = None if slope is None else nodal_vectors(slope, "forces_slope", held.shape)
-        return cls(A, f, load_slope, Supports(held, np.zeros(held.shape), np.zeros_like(held)))
+        return cls(A, f, load_slope, replace(Supports.none(held.shape), fixed=held))
+
+    def by_rows(self, values: Floats | Mask) -> Any:
+        """Values of nodes, (N, dimension), by rows of A; 0 for rows of other things."""
+        found = np.zeros(len(self.f), dtype=values.dtype)
+        found[plain_dofs(values.shape) if self.dofs is None else self.dofs] = values
+        return found
+
+    def eliminated(self, apart: Mask) -> Elimination:
+        """Elimination of all supports and equations, but for what is set apart.
+
+        Raises
+        ------
+        InvalidArgumentError
+            They contradict each other.
+        """
+        given = self.supports
+        fixed, values, slopes = (self.by_rows(own) for own in (given.fixed, given.values, given.slopes))
+        return eliminated(fixed, values, slopes, self.equations, self.by_rows(apart), self.named)
 
 
-def displacements_along(means: sp.csr_array, directions: Floats, dofs: Integers, left: Integers) -> sp.csr_array:
-    """Components along directions (k, dimension) of the means (k, N) of nodal displacements, by what is left."""
+def displacements_along(means: sp.csr_array, directions: Floats, dofs: Integers, count: int) -> sp.csr_array:
+    """Components along directions (k, dimension) of the means (k, N) of nodal displacements, by ``count`` rows of A."""
     entries = means.tocoo()
     row, node = entries.coords
     data = entries.data[:, None] * directions[row]
-    shape, columns = (means.shape[0], dofs.size), dofs[node]
-    every = sp.csr_array((data.ravel(), (np.repeat(row, dofs.shape[1]), columns.ravel())), shape=shape)
-    rows = sp.csr_array(every[:, left])
-    rows.eliminate_zeros()
-    return rows
+    shape, columns = (means.shape[0], count), dofs[node]
+    return sp.csr_array((data.ravel(), (np.repeat(row, dofs.shape[1]), columns.ravel())), shape=shape)
 
 
 def gathered(cells: Integers, shares: Floats, density: Floats, count: int) -> Floats:
@@ -198,7 +231,7 @@ def problem_of(
     body: Body,
     contact: ContactRows,
     axes: tuple[Floats, ...],
-    mesh: Callable[[Integers], BodyMesh] | None = None,
+    mesh: Callable[[sp.csr_array, Floats], BodyMesh] | None = None,
     modes: Floats | None = None,
     mass: sp.csc_array | None = None,
     **more: Any,
@@ -212,11 +245,11 @@ def problem_of(
     axes : tuple of one or two (p, dimension) arrays
         Tangents of the contact rows, see `axes_of`.
     mesh : callable or None
-        What the problem keeps of its mesh, from the degrees of freedom that are left.
-    modes : (d N, r) array or None
-        Rigid motions that nothing holds.
-    mass : (d N, d N) csc_array or None
-        Of all degrees of freedom.
+        What the problem keeps of its mesh, from the motion of its nodes (d N, n) and given displacements (N, d).
+    modes : (m, r) array or None
+        Rigid motions that nothing holds, by rows of A.
+    mass : (m, m) csc_array or None
+        By rows of A.
     **more
         As in `ContactProblem` and `ContactProblem3D`.
 
@@ -227,37 +260,91 @@ def problem_of(
     Raises
     ------
     InvalidArgumentError
-        An axis is oblique to the plane of symmetry on which its node lies.
+        An axis is oblique to the plane of symmetry on which its node lies, supports and equations contradict each
+        other, or contact rows depend on each other by them.
     InvalidProblemError
         The body is free to move as a rigid body, or the data are not admissible.
     """
     check_axes(contact, axes)
-    supports = body.supports
-    dofs, load = plain_dofs(supports.fixed.shape) if body.dofs is None else body.dofs, body.f
-    fixed, uncoupled, moved = np.zeros(len(load), bool), np.zeros(len(load), bool), np.zeros(len(load))
-    fixed[dofs], uncoupled[dofs] = supports.fixed, contact.apart
-    moved[dofs] = np.where(supports.fixed, supports.values, 0.0)
-    left = np.flatnonzero(~fixed | uncoupled)
-    if np.any(moved):
-        load = load - body.A @ moved
-    kept = np.where(uncoupled, 0.0, 1.0)[left]
-    A = sp.csc_array(body.A[left][:, left])
-    if np.any(uncoupled):
-        coupled = sp.diags_array(kept)
-        A = sp.csc_array(coupled @ A @ coupled + sp.diags_array(np.where(kept == 0, A.diagonal(), 0.0)))
-    if mass is not None:
-        coupled, own = sp.diags_array(kept), sp.csc_array(mass[left][:, left])
-        more["mass"] = sp.csc_array(coupled @ own @ coupled + sp.diags_array(np.where(kept == 0, own.diagonal(), 0.0)))
-    rows = (displacements_along(contact.means, axis, dofs, left) for axis in (contact.normals, *axes))
-    arrays: tuple[Any, ...] = (A, *rows, kept * load[left])
-    more["load_slope"] = None if body.load_slope is None else kept * body.load_slope[left]
-    more["mesh"] = None if mesh is None else mesh(left)
-    more["rigid_modes"] = None if modes is None else modes[left]
+    dofs = plain_dofs(body.supports.fixed.shape) if body.dofs is None else body.dofs
+    given = body.eliminated(contact.apart)
+    T, kept = given.T, np.where(body.by_rows(contact.apart), 0.0, 1.0)[given.left]
+    rows = [displacements_along(contact.means, axis, dofs, len(body.f)) for axis in (contact.normals, *axes)]
+    if body.equations:
+        check_independent(contact, sp.csr_array(sp.vstack(rows) @ T))
+    load = body.f - body.A @ given.offset if np.any(given.offset) else body.f
+    slope = body.load_slope
+    driven = np.any(given.slope)
+    if driven:
+        follows = followed(sp.csr_array(T @ sp.diags_array(kept)), given.slope, sp.csr_array(sp.vstack(rows)))
+        slope = (0.0 if slope is None else slope) - body.A @ follows
+    rows = [reduced(own @ T, int(driven)) for own in rows]
+    if driven:
+        T, kept = sp.csr_array(sp.hstack([T, sp.csr_array(follows[:, None])])), np.append(kept, 0.0)
+    A, alone = _alone(body.A, T, kept)
+    arrays: tuple[Any, ...] = (A, *rows, kept * (T.T @ load))
+    more["load_slope"] = None if slope is None else kept * (T.T @ slope)
+    if driven:  # its displacement is alpha
+        more["load_slope"][-1] = alone
+    more |= _relative(contact, axes, given.offset[dofs], more)
+    more["mass"] = None if mass is None else _alone(mass, T, kept)[0]
+    more["mesh"] = None if mesh is None else mesh(sp.csr_array(T[dofs.ravel()]), given.offset[dofs])
+    more["rigid_modes"] = None if modes is None else np.pad(modes[given.left], ((0, int(driven)), (0, 0)))
     if dofs.shape[1] == 2:
         return ContactProblem(*arrays, **more)
     from enumsol.model.problem3d import ContactProblem3D  # not for problems in 2D
 
     return ContactProblem3D(*arrays, **more)
+
+
+def reduced(rows: sp.csr_array, more: int = 0) -> sp.csr_array:
+    """Rows without zeros, with so many columns of zeros after the others."""
+    rows = sp.csr_array(rows)
+    rows.eliminate_zeros()
+    rows.resize(rows.shape[0], rows.shape[1] + more)
+    return rows
+
+
+def _alone(A: sp.csc_array, T: sp.csr_array, kept: Floats) -> tuple[sp.csc_array, float]:
+    """T' A T with rows and columns where ``kept`` is 0 alone on their diagonals, and the last entry of this."""
+    own = sp.csc_array(sp.csc_array(T.T) @ A @ T)
+    if np.all(kept):
+        return own, 0.0
+    coupled, diagonal = sp.diags_array(kept), own.diagonal()
+    lone = np.where(kept == 0, np.where(diagonal > 0, diagonal, np.max(diagonal)), 0.0)
+    return sp.csc_array(coupled @ own @ coupled + sp.diags_array(lone)), float(lone[-1])
+
+
+def _relative(contact: ContactRows, axes: tuple[Floats, ...], offset: Floats, more: dict[str, Any]) -> dict[str, Any]:
+    """Gaps and slips less what given displacements (N, dimension) make of them."""
+    moved = np.asarray(contact.means @ offset)
+    if not np.any(moved):
+        return {}
+    normal, *slips = (np.sum(moved * axis, axis=1) for axis in (contact.normals, *axes))
+    slip = slips[0] if len(slips) == 1 else np.stack(slips, axis=1)
+    return {
+        "gap": np.asarray(more.get("gap", 0.0)) - normal,
+        "slip_offset": np.asarray(more.get("slip_offset", 0.0)) - slip,
+    }
+
+
+def check_independent(contact: ContactRows, rows: sp.csr_array) -> None:
+    """Refuse contact rows, normal ones before tangential ones, that equations make dependent on each other.
+
+    Raises
+    ------
+    InvalidArgumentError
+        It names a node.
+    """
+    values, vectors = np.linalg.eigh((rows @ rows.T).toarray())
+    if values[0] > _DEPENDENT * values[-1]:
+        return
+    node = contact.nodes[int(np.argmax(np.abs(vectors[:, 0]))) % len(contact.nodes)]
+    raise InvalidArgumentError(
+        f"contact node {node} has rows that depend on each other or on those of others, for a displacement across the "
+        "axes, an equation, a tie or a rigid part moves them together; expected contact nodes that move on their own "
+        "(of a pair, the rigid part as the second)"
+    )
 
 
 def axes_of(tangents: Tangents, normals: Floats) -> tuple[Floats, ...]:

@@ -7,12 +7,12 @@ from collections.abc import Mapping
 import numpy as np
 import scipy.sparse as sp
 
+from enumsol.decks.elements import element_type
 from enumsol.errors import InvalidArgumentError
 from enumsol.fem.assembly import outward_normal
 from enumsol.fem.bases import SIMPLICES, corners_of, place_of
 from enumsol.fem.conditions import holding
 from enumsol.fem.contacts import Group, faced
-from enumsol.fem.file_counts import taken_as
 from enumsol.fem.meshes import SAME, PartedMesh, cell_name, unit_vectors
 from enumsol.fem.scenes import Scene
 from enumsol.model.cells import boundary_facets
@@ -188,7 +188,13 @@ def scene_notes(scene: Scene) -> list[str]:
 
 def _formulations(scene: Scene) -> list[str]:
     """Notes on elements of the file that others take the place of."""
-    return taken_as(scene.mesh.types)
+    kinds = [kind for kind in map(element_type, scene.mesh.types) if kind is not None and kind.is_body]
+    return [
+        f"elements of type {kind.name} are taken as {kind.plain}, with full integration and without incompatible "
+        "modes, hybrid or modified formulations, which can be stiffer in bending than the program of the file has them"
+        for kind in kinds
+        if kind.name != kind.plain
+    ]
 
 
 def _unjoined(scene: Scene) -> list[str]:
@@ -284,7 +290,7 @@ def _alone(scene: Scene) -> list[str]:
 
 def _rest(scene: Scene) -> list[str]:
     """Nothing that acts on the bodies."""
-    acting = np.any(scene.forces) or np.any(scene.slope) or np.any(scene.held.values)
+    acting = np.any(scene.forces) or np.any(scene.slope) or np.any(scene.held.values) or np.any(scene.held.slopes)
     if acting or np.any(scene.gaps < 0):
         return []
     return ["nothing acts on the body: it has no load, press fit or given displacement, and rests"]
@@ -299,6 +305,11 @@ def _loaded_contact(scene: Scene) -> list[str]:
             if any(tuple(sorted(row)) in corners for row in scene.mesh.part(part).tolist()):
                 what = "stiffens" if option == "spring" else "acts on"
                 notes.append(f"{option} of {part} {what} contact nodes, as {part} is in contact")
+    touching = scene.contacts.rows.nodes
+    for option in ("force", "force_slope"):
+        named = getattr(scene.options, option) or ()
+        on = [part for part in named if np.any(np.isin(scene.mesh.nodes(part), touching))]
+        notes += [f"{option} of {part} acts on contact nodes" for part in on]
     return notes
 
 

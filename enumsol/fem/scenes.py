@@ -41,7 +41,10 @@ if TYPE_CHECKING:
 
 
 #: Options that say what a part of the boundary is for.
-_USES = ("contact", "clamp", "symmetry", "displacement", "spring", "load", "load_slope", "pressure", "pressure_slope")
+_USES = (
+    *("contact", "clamp", "symmetry", "displacement", "displacement_slope", "spring"),
+    *("load", "load_slope", "pressure", "pressure_slope", "force", "force_slope"),
+)
 
 
 @dataclass(frozen=True)
@@ -172,19 +175,14 @@ class Scene:
         modes, bound = self._rigid_modes()
         stiffness = sp.csc_array(self.body.stiffness(*self.lame.T) + self.springs)
         axes = _axes(nodes, self.options.axis, self.dimension)
-        # less what given displacements of the nodes of pairs make of gaps and slips
-        moved = np.asarray(nodes.means @ supports.values)
-        normal, *slips = (-np.sum(moved * axis, axis=1) for axis in (nodes.normals, *axes))
-        slip_offset = slips[0] if len(slips) == 1 else np.stack(slips, axis=1)
         problem = problem_of(
             Body(stiffness, self.forces.ravel(), self.slope.ravel() if np.any(self.slope) else None, supports),
             nodes,
             axes,
             modes=modes,
             mass=self._mass(),
-            mesh=lambda left: BodyMesh.of_dofs(mesh.points, mesh.cells, left, supports.values, surface, lame=self.lame),
-            gap=gaps + normal,
-            slip_offset=slip_offset,
+            mesh=lambda motion, moved: BodyMesh(mesh.points, mesh.cells, motion, moved, surface, lame=self.lame),
+            gap=gaps,
             node_ids=nodes.nodes.tolist(),
             coordinates=mesh.points[nodes.nodes],
             max_rigid_displacement=bound,

@@ -568,7 +568,7 @@ def solid_contact_problem(
         body,
         restrained.ContactRows(rows.means, normal, np.zeros_like(mask)),
         (first, second),
-        mesh=lambda left: BodyMesh.of_dofs(nodes, bodies, left, None, surface.facets, of_facets, lame),
+        mesh=lambda motion, _: BodyMesh(nodes, bodies, motion, None, surface.facets, of_facets, lame),
         gap=gap,
         friction=friction,
         friction_slope=friction_slope,
@@ -611,7 +611,10 @@ def _slips(
     values = surface.interpolation()
     patch = np.repeat(of_facets, values.shape[0] // len(surface.facets))
     moving = (patch >= 0)[:, None]
-    T1, T2 = (restrained.displacements_along(values, np.where(moving, axis[patch], 0.0), dofs, free) for axis in axes)
+    every = (
+        restrained.displacements_along(values, np.where(moving, axis[patch], 0.0), dofs, dofs.size) for axis in axes
+    )
+    T1, T2 = (restrained.reduced(rows[:, free]) for rows in every)
     if offset.shape != (len(axes[0]), 2):
         offset = np.zeros((len(axes[0]), 2))  # ContactProblem3D refuses a wrong shape
     return T1, T2, np.where(moving, offset[patch], 0.0)

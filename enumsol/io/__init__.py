@@ -44,6 +44,9 @@ In 3D both take ``Bt1`` and ``Bt2`` instead of ``Bt``, which tell a problem in 3
 ``.vtu``
     Displacements, contact forces and stresses of solutions in 2D and 3D, for ParaView: `enumsol.write_vtu`, by meshio.
 
+``.frd``
+    The same for CGX, `enumsol.write_frd`; and displacements that CalculiX computed: `enumsol.read_results`.
+
 NumPy archives and MatrixMarket directories give every number back bit by bit. Pickled objects are never loaded.
 """
 
@@ -53,6 +56,12 @@ from typing import TYPE_CHECKING, Any
 
 from enumsol.errors import InvalidArgumentError, InvalidProblemError
 from enumsol.io import fclib, matrix_market, npz
+from enumsol.io.assembled import (
+    AssembledStiffness,
+    read_abaqus_stiffness,
+    read_ansys_stiffness,
+    read_calculix_stiffness,
+)
 from enumsol.model.problem import check_is_problem
 from enumsol.support.arguments import file_path
 from enumsol.support.files import writing
@@ -63,7 +72,14 @@ if TYPE_CHECKING:
 
     from enumsol.model.problem3d import AnyProblem
 
-__all__ = ["read_problem", "write_problem"]
+__all__ = [
+    "AssembledStiffness",
+    "read_abaqus_stiffness",
+    "read_ansys_stiffness",
+    "read_calculix_stiffness",
+    "read_problem",
+    "write_problem",
+]
 
 _A_PLACE = "the name of a file or directory"
 #: Endings of the files that hold a problem.

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any, Protocol
 from xml.etree import ElementTree
 
 import numpy as np
+import scipy.sparse as sp
 
 from enumsol.errors import InvalidArgumentError, MissingDependencyError
 from enumsol.model.cells import KINDS, by_kind
@@ -117,27 +118,39 @@ def write_vtu(problem: AnyProblem, state: SolvedState | Sequence[SolvedState], p
     ...     pathlib.Path(folder, "free.vtu").stat().st_size > 1000
     True
     """
+    place = file_path(path, "path")
+    if place.suffix != ".vtu":
+        raise InvalidArgumentError(f"path is {str(place)!r}; expected a name that ends in .vtu")
+    pictures = pictures_of(problem, state)
+    several = isinstance(state, Sequence)
+    places = [place.with_stem(f"{place.stem}-{k}") for k in range(len(pictures))] if several else [place]
+    files: dict[Path, Content] = {
+        file: partial(picture.write, file_format="vtu") for file, picture in zip(places, pictures, strict=True)
+    }
+    if several:
+        files[place.with_suffix(".pvd")] = _collection([file.name for file in places])
+    with writing(place, "path"):
+        write_files(files)
+
+
+def pictures_of(problem: AnyProblem, state: SolvedState | Sequence[SolvedState], what: str = "VTU files") -> list[Any]:
+    """States as meshes of meshio with their data, for files that ``what`` names; see `write_vtu`.
+
+    Raises
+    ------
+    InvalidArgumentError, MissingDependencyError
+        As `write_vtu`.
+    """
     given: object = problem
     if not isinstance(given, (ContactProblem, ContactProblem3D)):
         raise InvalidArgumentError(
             f"problem is a {type(given).__name__}; expected a ContactProblem or ContactProblem3D"
         )
-    place = file_path(path, "path")
-    if place.suffix != ".vtu":
-        raise InvalidArgumentError(f"path is {str(place)!r}; expected a name that ends in .vtu")
-    if not isinstance(state, Sequence):
-        states = {place: state}
-    elif not len(state):
-        raise InvalidArgumentError(f"state is {_empty(state)}; expected at least one")
-    else:
-        states = {place.with_stem(f"{place.stem}-{k}"): one for k, one in enumerate(state)}
-    meshio = MissingDependencyError.imported("meshio", "VTU files", "meshes")
-    pictures = {file: _picture(meshio, problem, one) for file, one in states.items()}
-    files: dict[Path, Content] = {file: partial(picture.write, file_format="vtu") for file, picture in pictures.items()}
-    if isinstance(state, Sequence):
-        files[place.with_suffix(".pvd")] = _collection([file.name for file in pictures])
-    with writing(place, "path"):
-        write_files(files)
+    states = state if isinstance(state, Sequence) else [state]
+    if not len(states):
+        raise InvalidArgumentError(f"state is {_empty(states)}; expected at least one")
+    meshio = MissingDependencyError.imported("meshio", what, "meshes")
+    return [_picture(meshio, problem, one) for one in states]
 
 
 def _empty(states: Sequence[SolvedState]) -> str:
@@ -265,7 +278,8 @@ def _body(meshio: ModuleType, problem: ContactProblem3D, mesh: BodyMesh, u: Floa
 def _nodes(problem: ContactProblem3D, mesh: BodyMesh) -> Integers:
     """The node that each contact row stands for."""
     rows = problem.contact_rows
-    nodes = mesh.dofs[rows.indices] // 3
+    rows = sp.csr_array(rows @ mesh.acting.T)
+    nodes = rows.indices // 3
     first = nodes[rows.indptr[:-1]]
     by_direction = first.reshape(3, problem.p)
     if np.any(nodes != np.repeat(first, np.diff(rows.indptr))) or np.any(by_direction != by_direction[0]):

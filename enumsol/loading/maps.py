@@ -74,7 +74,8 @@ def multiplicity_map(
         for example with another mesh.
     without : "running away", optional
         Leave out solutions that are proven to run away (see `stability`; the problems need a mass or a mesh). Undecided
-        ones are counted, and so are those at vertices of the graphs, as at the ends of the interval.
+        ones are counted, and then the map is not complete; counted are also those at vertices of the graphs, as at the
+        ends of the interval.
     executor : concurrent.futures.Executor, optional
         Makes several graphs at a time. A function ``make`` must be one that other processes can import.
     jobs : int, optional
@@ -315,6 +316,9 @@ class MultiplicityMap(Immutable):
         if self.complete:
             return f"complete: yes (proven at these values{self._within()}; says nothing about those between)"
         number = sum(not row.complete for row in self.rows)
+        if {reason for row in self.rows for reason in row.reasons} == {_NOT_DECIDED}:
+            values = f"{number} of {counted(len(self.rows), 'value')}"
+            return f"complete: no (at {values} it is not decided whether some solutions run away{self._within()})"
         return f"complete: no (not proven at {number} of {counted(len(self.rows), 'value')}{self._within()})"
 
     def _within(self) -> str:
@@ -334,15 +338,19 @@ class MultiplicityMap(Immutable):
         lines.append(f"{self.name:>8}  {'solutions':<{width}}  {'unique until':>12}")
         lines += [f"{row.value:>8.5g}  {_counts(row):<{width}}  {_limit(row):>12}" for row in self.rows]
         if any(row.left_out for row in self.rows):
-            open_ones = " and undecided ones counted" if any(any(row.undecided) for row in self.rows) else ""
+            open_ones = (
+                "; 1-2 means that one of two may run away" if any(any(row.undecided) for row in self.rows) else ""
+            )
             lines.append(f"solutions that run away are left out{open_ones}")
         return "\n".join([*lines, self.closing_line])
 
 
 def _counts(row: MapRow) -> str:
     """The numbers of solutions between critical alphas, in their order."""
-    text = " ".join(str(count) for k, count in enumerate(row.between) if k == 0 or count != row.between[k - 1])
-    return text if row.exact else f"at least {text}"
+    open_ones = row.undecided or (0,) * len(row.between)
+    bounds = [f"{n - m}-{n}" if m else str(n) for n, m in zip(row.between, open_ones, strict=True)]
+    text = " ".join(own for k, own in enumerate(bounds) if k == 0 or own != bounds[k - 1])
+    return text if row.exact or row.reasons == (_NOT_DECIDED,) else f"at least {text}"
 
 
 def _limit(row: MapRow) -> str:
@@ -430,7 +438,7 @@ class MapRow:
     at_alphas, between : tuples of int
         Numbers of solutions at these alphas, and between them.
     exact : bool
-        These are the numbers and not lower bounds.
+        These are the numbers and not lower bounds, and none that is counted is undecided.
     folds : tuple of MapFold
     complete : bool
     reasons : tuple of str
@@ -444,7 +452,8 @@ class MapRow:
         [length].
     left_out, undecided : tuples of int
         Where solutions that run away are left out of the numbers: how many they are between the alphas, and how many
-        of those that are counted are undecided. ``limit`` and ``unique`` are about all solutions.
+        of those that are counted are undecided; a row with such is not complete, as ``reasons`` say. ``limit`` and
+        ``unique`` are about all solutions.
     """
 
     value: float
@@ -470,6 +479,10 @@ class MapRow:
             if alpha < critical:
                 return self.between[k - 1]
         return self.between[-1]
+
+
+#: A reason beside those of the graph.
+_NOT_DECIDED = "whether some solutions run away is not decided"
 
 
 def map_row(
@@ -521,14 +534,18 @@ def _resting(row: MapRow, graph: BranchGraph, started: float) -> MapRow:
     passing = [a & b for a, b in zip([over[0], *over], [*over, over[-1]], strict=True)]
     at = [verdicts(arcs, alpha) for arcs, alpha in zip(passing, alphas, strict=True)]
     at[0] = at[-1] = Counter()  # at the ends of the interval there are vertices
-    away = "runs away"
+    away, undecided = "runs away", tuple(found["undecided"] for found in between)
+    decided = not any(undecided)
     return replace(
         row,
+        exact=row.exact and decided,
+        complete=row.complete and decided,
+        reasons=row.reasons if decided else (*row.reasons, _NOT_DECIDED),
         alphas=alphas,
-        at_alphas=tuple(row.count_at(x) - found[away] for x, found in zip(alphas, at, strict=True)),
-        between=tuple(row.count_at(x) - found[away] for x, found in zip(middles, between, strict=True)),
+        at_alphas=tuple(max(row.count_at(x) - found[away], 0) for x, found in zip(alphas, at, strict=True)),
+        between=tuple(max(row.count_at(x) - found[away], 0) for x, found in zip(middles, between, strict=True)),
         left_out=tuple(found[away] for found in between),
-        undecided=tuple(found["undecided"] for found in between),
+        undecided=undecided,
         seconds=time.perf_counter() - started,
     )
 

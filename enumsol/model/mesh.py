@@ -2,17 +2,17 @@
 
 from __future__ import annotations
 
+from functools import cached_property
+
 import numpy as np
 import scipy.sparse as sp
+from scipy.sparse.csgraph import connected_components
 
 from enumsol.errors import InvalidArgumentError, InvalidProblemError
 from enumsol.model.cells import KINDS, numbers_of_nodes
 from enumsol.support.array_arguments import real_array, real_matrix, vector_of
 from enumsol.support.array_types import ArrayLike, Floats, Integers
 from enumsol.support.immutable import Immutable, SealedMatrix, sealed
-
-#: How far products of the columns of a motion may be from those of orthonormal ones.
-_ORTHONORMAL = 1e-8
 
 
 class BodyMesh(Immutable):
@@ -26,8 +26,9 @@ class BodyMesh(Immutable):
         Triangles (k = 3 or 6), quadrilaterals (4, 8 or 9), tetrahedra (4 or 10) or hexahedra (8 or 27), in the order of
         VTK; a triangle among quadrilaterals names its last corner twice.
     motion : (d N, n) array_like or sparse
-        Row ``d node + component`` gives that component of the node's displacement from u, in global axes; its columns
-        are orthonormal, so that its transpose takes nodal forces to the problem's right-hand side.
+        Row ``d node + component`` gives that component of the node's displacement from u, in global axes; its transpose
+        takes nodal forces to the problem's right-hand side. Each entry of u is the component of a node, or what several
+        move by, as the motion of a rigid part.
     offset : (N, d) array_like or None
         Prescribed displacements [length]; None: no node is moved.
     facets : (k, m) array_like of int or None
@@ -72,9 +73,6 @@ class BodyMesh(Immutable):
             raise InvalidProblemError(
                 f"mesh_motion has shape {self._motion.shape}; expected {d} N = {d * count} rows, {d} for each node"
             )
-        off = sp.csr_array(self.motion.T @ self.motion - sp.eye_array(self._motion.shape[1]))
-        if np.max(np.abs(off.data), initial=0.0) > _ORTHONORMAL:
-            raise InvalidProblemError("mesh_motion has columns that are not orthonormal; expected orthonormal ones")
         self.offset = None if offset is None else sealed(real_array(offset, "mesh_offset"))
         if self.offset is not None and self.offset.shape != self.points.shape:
             raise InvalidProblemError(f"mesh_offset has shape {self.offset.shape}; expected (N, {d}) = ({count}, {d})")
@@ -137,6 +135,34 @@ class BodyMesh(Immutable):
             raise InvalidArgumentError("the mesh has nodes whose axes are turned; expected entries of u along x, y, z")
         return np.asarray(columns.indices, dtype=np.int64)
 
+    @cached_property
+    def acting(self) -> sp.csr_array:
+        """Forces on nodes that stand for forces on u, sparse (d N, n): ``motion.T @ acting`` is the identity.
+
+        A force on the component of a node acts on this node alone; others are spread over nodes that move with them.
+        """
+        motion = self.motion
+        lone = np.flatnonzero(np.diff(motion.indptr) == 1)
+        lone = lone[motion.data[motion.indptr[lone]] == 1.0]
+        if self.facets is not None:  # of nodes that move as one, those of the contact surface
+            lone = lone[np.argsort(~np.isin(lone // self.points.shape[1], self.facets), kind="stable")]
+        columns, first = np.unique(motion.indices[motion.indptr[lone]], return_index=True)
+        own = sp.csr_array((np.ones(len(columns)), (lone[first], columns)), shape=motion.shape)
+        others = np.setdiff1d(np.arange(motion.shape[1]), columns)
+        if not len(others):
+            return own
+        part = sp.csc_array(motion)[:, others]
+        # where they are coupled, as motions of one rigid part, by their pseudoinverse
+        count, of = connected_components(part.T @ part, directed=False)
+        for k in range(count):
+            group = np.flatnonzero(of == k)
+            block = part[:, group]
+            nodes = np.unique(block.indices)
+            spread = np.linalg.pinv(block[nodes].toarray()).T
+            places = (np.repeat(nodes, len(group)), np.tile(others[group], len(nodes)))
+            own = own + sp.csr_array((spread.ravel(), places), shape=motion.shape)
+        return sp.csr_array(own)
+
     def directions(self, rows: sp.csr_array) -> Floats:
         """Directions (p, d) in global axes of rows (p, n) that stand for the displacement of one point each.
 
@@ -148,7 +174,7 @@ class BodyMesh(Immutable):
             own[:] = 0.0
             own[self.facets] = 1.0
         axes = np.kron(own[:, None], np.eye(d))
-        return np.asarray(rows @ (self.motion.T @ axes))
+        return np.asarray(rows @ (self.acting.T @ axes))
 
     def displacements(self, u: ArrayLike) -> Floats:
         """Displacement of every node, shape (N, d), for u of shape (n,) [length].

@@ -43,6 +43,8 @@ class BodyShape:
     cells : (M, k) array of int
     motion : sparse (d N, n)
         Displacements of the nodes from u.
+    acting : sparse (d N, n)
+        Forces on the nodes from forces on u.
     offset : (N, d) array
         Prescribed displacements [length].
     weights : sparse (p, N)
@@ -52,6 +54,7 @@ class BodyShape:
     points: Floats
     cells: Integers
     motion: sp.csr_array
+    acting: sp.csr_array
     offset: Floats
     weights: sp.csr_array
 
@@ -79,7 +82,7 @@ class BodyShape:
     def contact_forces(self, problem: AnyProblem, lambda_n: Floats, lambda_t: Floats) -> Floats:
         """Contact forces on all nodes of the body in global axes, (N, d) [force]."""
         rows = np.concatenate([lambda_n, lambda_t.ravel(order="F")])
-        forces = -np.asarray(self.motion @ (problem.contact_rows.T @ rows)).reshape(self.points.shape)
+        forces = -np.asarray(self.acting @ (problem.contact_rows.T @ rows)).reshape(self.points.shape)
         size = np.linalg.norm(forces, axis=1, keepdims=True)
         return np.asarray(np.where(size > _LEAST_FORCE * np.max(size, initial=0.0), forces, 0.0))
 
@@ -104,12 +107,12 @@ def body_shape(problem: AnyProblem) -> BodyShape:
     mesh = _mesh_of(problem)
     points, motion = mesh.points, mesh.motion
     offset = np.zeros_like(points) if mesh.offset is None else mesh.offset
-    by_node = sp.csr_array(abs(problem.Bn) @ abs(motion).T)
+    by_node = sp.csr_array(abs(problem.Bn) @ abs(mesh.acting).T)
     dimension = points.shape[1]
     gather = sp.kron(sp.eye_array(len(points)), np.ones((dimension, 1)))
     weights = sp.csr_array(by_node @ gather)
     scale = 1.0 / np.asarray(weights.sum(axis=1)).ravel()
-    return BodyShape(points, mesh.cells, motion, offset, sp.csr_array(sp.diags_array(scale) @ weights))
+    return BodyShape(points, mesh.cells, motion, mesh.acting, offset, sp.csr_array(sp.diags_array(scale) @ weights))
 
 
 def _mesh_of(problem: AnyProblem) -> BodyMesh:

@@ -23,7 +23,7 @@ from enumsol.trusted.status_rows import BACKWARD, CONTACT, FORWARD, UNDECIDED, f
 if TYPE_CHECKING:
     from collections.abc import Collection, Iterable, Sequence
 
-    from enumsol.model.problem import ContactProblem
+    from enumsol.model.problem3d import AnyProblem
     from enumsol.support.array_types import Codes, Floats, NDArray
 
     #: A row in 3D: its kind, its node, and the number of a direction or sector.
@@ -54,7 +54,29 @@ class RefusedError(Exception):
     """A proof cannot be followed any further; it never leaves the checkers."""
 
 
-def data_of(header: Any, problem: ContactProblem, kind: str | None) -> Data:
+def check_header(header: Any, problem: AnyProblem, kind: str | None, names: Collection[str] | None = None) -> None:
+    """Refuse a header that does not fit the problem and the kind of proof.
+
+    ``names`` are those that it has beside the usual ones, no others; None where others have no meaning.
+
+    Raises
+    ------
+    RefusedError
+        It does not fit.
+    """
+    known = isinstance(header, dict) and header.get("format") == "enumsol-proof"
+    if not known or not same(header.get("version"), PROOF_VERSION):
+        raise RefusedError(f"the first record is not the header of an enumsol-proof of version {PROOF_VERSION}")
+    if header.get("problem") != problem.fingerprint:
+        raise RefusedError("the proof belongs to another problem (its fingerprint is different)")
+    if ("kind" in header) != (kind is not None) or header.get("kind") != kind:
+        raise RefusedError(f"the header names an unknown kind of proof, {quoted(header.get('kind'))}")
+    usual = {"format", "version", "kind", "problem", "p"}
+    if not same(header.get("p"), problem.p) or (names is not None and header.keys() != usual | {*names}):
+        raise RefusedError("the header does not fit the problem")
+
+
+def data_of(header: Any, problem: AnyProblem, kind: str | None) -> Data:
     """Data that a header claims to certify, "problem" or "condensed", once it fits the problem and the kind of proof.
 
     Raises
@@ -62,15 +84,9 @@ def data_of(header: Any, problem: ContactProblem, kind: str | None) -> Data:
     RefusedError
         It does not.
     """
-    known = isinstance(header, dict) and header.get("format") == "enumsol-proof"
-    if not known or not same(header.get("version"), PROOF_VERSION):
-        raise RefusedError(f"the first record is not the header of an enumsol-proof of version {PROOF_VERSION}")
-    if header.get("problem") != problem.fingerprint:
-        raise RefusedError("the proof belongs to another problem (its fingerprint is different)")
-    if not same(header.get("p"), problem.p) or header.get("data") not in ("problem", "condensed"):
+    check_header(header, problem, kind)
+    if header.get("data") not in ("problem", "condensed"):
         raise RefusedError("the header does not fit the problem")
-    if ("kind" in header) != (kind is not None) or header.get("kind") != kind:
-        raise RefusedError(f"the header names an unknown kind of proof, {quoted(header.get('kind'))}")
     if problem.held:
         return "problem" if header["data"] == "problem" else "condensed"
     if header["data"] != "problem":
@@ -264,7 +280,7 @@ def weights_from(value: object, free: Codes, codes: Codes, friction: Sequence[bo
     return numbers_from(value, len(free) + sliding + 4 * sum(friction[i] for i in free))
 
 
-def friction_at(problem: ContactProblem, alpha: Fraction) -> list[Fraction]:
+def friction_at(problem: AnyProblem, alpha: Fraction) -> list[Fraction]:
     """The friction coefficients at an alpha, exactly; ValueError where one is negative."""
     exact = exactly_at(alpha, *problem.affine_friction)
     if min(exact) < 0:

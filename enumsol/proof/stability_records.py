@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from enumsol.proof.reading import numbers_from, quoted
-from enumsol.trusted.running_away import Growing, NoMotion
+from enumsol.trusted.running_away import Behaviour, Growing, NoMotion
 
 if TYPE_CHECKING:
     from enumsol.support.array_types import Floats
@@ -39,7 +39,7 @@ def is_certificate(record: Any) -> bool:
 def certificate_record(part: int, said: Growing | NoMotion) -> list[Any]:
     """The record of a certificate about a part of the body."""
     if isinstance(said, Growing):
-        return [GROWS, part, said.low, said.high, list(said.slides)]
+        return [GROWS, part, said.low, said.high, list(said.way.slides)]
     k = len(said.weights)
     high = None if math.isinf(said.high) else said.high
     decided = [int(i) for i in said.slides], [int(i) for i in said.stays]
@@ -62,7 +62,7 @@ def certificate_from(record: list[Any], k: int) -> Growing | NoMotion:
         if len(record) != 5:
             raise ValueError(f"{quoted(record)} is not about a motion that grows")
         low, high = numbers_from(record[2:4], 2).tolist()
-        return Growing(low, high, _indices(record[4], k))
+        return Growing(low, high, Behaviour(_indices(record[4], k)))
     if len(record) != 10:
         raise ValueError(f"{quoted(record)} is not about a range in which nothing grows")
     _, _, low, high, beside, slides, stays, weights, first, last = record

@@ -52,7 +52,7 @@ def body_record(problem: AnyProblem, scene: Scene | None = None) -> tuple[dict[s
     solved = [problem.factorization.solve(np.asarray(column)) for column in _loads(problem)]
     moved = [motion @ column for column in solved]
     moved[0] = moved[0] + shape.offset[nodes].ravel()
-    forces = -sp.csr_array(problem.contact_rows @ shape.motion.T).toarray().reshape(d * problem.p, -1, d)
+    forces = -sp.csr_array(problem.contact_rows @ shape.acting.T).toarray().reshape(d * problem.p, -1, d)
     return body | _stress_columns(problem, shape, solved) | {
         "u0": short_list(moved[0]),
         "u1": short_list(moved[1]),
@@ -108,7 +108,7 @@ def drawn_body(
     contact surface is seen best. What `surroundings` gives is about a solid, too.
     """
     cells, d, new = shape.cells, shape.points.shape[1], np.full(len(shape.points), -1)
-    touched = np.unique(sp.csr_array(problem.contact_rows @ shape.motion.T).indices // d)
+    touched = np.unique(sp.csr_array(problem.contact_rows @ shape.acting.T).indices // d)
     if d == 3:
         faces = facet_outlines(boundary_facets(3, cells))
         nodes = np.union1d(faces, touched)
@@ -182,7 +182,9 @@ def surroundings(
     """
     motion, (count, d) = shape.motion, shape.points.shape
     slope = np.zeros(problem.n) if problem.load_slope is None else problem.load_slope
-    forces = np.hstack([(motion @ vector).reshape(-1, d) for vector in (problem.f, slope)])
+    # what nothing is coupled with is held, or moved as alpha says
+    coupled = np.diff(problem.A.indptr) > 1
+    forces = np.hstack([(shape.acting @ np.where(coupled, own, 0.0)).reshape(-1, d) for own in (problem.f, slope)])
     acting = acting_nodes(forces)
     if len(np.setdiff1d(acting, edges)) > SIGNS:  # a weight: its resultant
         weights = np.linalg.norm(forces[acting], axis=1)
@@ -216,7 +218,7 @@ def _foundation(problem: AnyProblem, shape: BodyShape) -> dict[str, Any]:
     ``walls`` has (row, x, y, gap), normals of the rigid foundation; ``lame`` the coefficients of the cells, one pair if
     all are the same.
     """
-    normals = np.asarray(problem.Bn @ shape.motion.T @ np.tile(np.eye(2), (len(shape.points), 1)))
+    normals = np.asarray(problem.Bn @ shape.acting.T @ np.tile(np.eye(2), (len(shape.points), 1)))
     walls = [
         [k, *short_list([*normal, problem.gap[k]])]
         for k, normal in enumerate(normals)

@@ -184,8 +184,11 @@ def scrolling(caption: str, table: str) -> str:
 #: Powers of force and of length in the unit of every option of `enumsol.fem.mesh_problem` that has one.
 _POWERS = {
     **dict.fromkeys(("young", "load", "load_slope", "pressure", "pressure_slope"), (1, -2)),
-    **dict.fromkeys(("spring", "body_force"), (1, -3)),
-    **dict.fromkeys(("thickness", "displacement", "gap", "obstacle", "max_rigid_displacement"), (0, 1)),
+    **dict.fromkeys(("spring", "body_force", "body_force_slope"), (1, -3)),
+    **dict.fromkeys(("force", "force_slope"), (1, 0)),
+    **dict.fromkeys(
+        ("thickness", "displacement", "displacement_slope", "gap", "obstacle", "max_rigid_displacement"), (0, 1)
+    ),
 }
 #: Options that mean nothing in 3D.
 _PLANE = ("plane", "thickness")

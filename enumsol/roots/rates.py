@@ -7,25 +7,28 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
 import numpy as np
-import scipy.sparse as sp
 
+from enumsol.arithmetic.balls import Ball, hull
 from enumsol.errors import InvalidArgumentError, TooLargeError
-from enumsol.roots.stability import Stabilities, displacement
-from enumsol.support.array_arguments import vector_of
+from enumsol.model.statuses import ContactStatus
+from enumsol.roots.stability import Equilibria, displacement
+from enumsol.support.array_arguments import real_array, vector_of
 from enumsol.support.immutable import Sealed
-from enumsol.trusted.running_away import positive, rates_in
+from enumsol.trusted.motions_of_body import BodyMotions, friction_over, reciprocal
+from enumsol.trusted.running_away import Behaviour, positive, rates_in
+from enumsol.trusted.status_rows import OPEN, SLIP_MINUS, SLIP_PLUS, STICK
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
-    from enumsol.arithmetic.balls import Ball
     from enumsol.model.problem3d import AnyProblem
     from enumsol.roots.root import Root
     from enumsol.support.array_types import ArrayLike, Floats
     from enumsol.trusted.motions_of_body import Setting
+    from enumsol.trusted.running_away import Motions
 
-#: Nodes at their limit up to which all ways in which they may slide or stay are tried.
-_LARGEST = 14
+#: Ways in which nodes at their limit and nodes without force may go on, up to which all are tried.
+_MOST_WAYS = 2**14
 
 
 @dataclass(frozen=True)
@@ -35,7 +38,9 @@ class Way(Sealed):
     Attributes
     ----------
     slides : tuple of int
-        Contact nodes at their limit that slide; the others there stick from now on.
+        Contact nodes that slide, of those at their limit and those that touch without force.
+    opens : tuple of int
+        Contact nodes that touch without force and open. The others of both kinds stick from now on.
     u : (n,) array
         Rate of the displacement [length / time].
     lambda_n, lambda_t : (p,) arrays; in 3D lambda_t is (p, 2)
@@ -52,6 +57,7 @@ class Way(Sealed):
     """
 
     slides: tuple[int, ...]
+    opens: tuple[int, ...]
     u: Floats = field(repr=False)
     lambda_n: Floats = field(repr=False)
     lambda_t: Floats = field(repr=False)
@@ -90,26 +96,30 @@ class Rates(Sealed):
         return self.complete and not self.ways
 
 
-def rates(problem: AnyProblem, root: Root, load_rate: ArrayLike) -> Rates:
+def rates(problem: AnyProblem, root: Root, load_rate: ArrayLike, friction_rate: ArrayLike = 0.0) -> Rates:
     """All ways in which an equilibrium goes on when the load changes at a rate; none means that it jumps.
 
-    Nodes that stick below their limit go on sticking, open ones stay open, and those at their limit slide on or stick,
-    one by one (theory, section 15.5; in 3D to first order). Coefficients do not change.
+    Nodes that stick below their limit go on sticking, open ones stay open, those at their limit slide on or stick, and
+    those that touch without force open, stick or slip, one by one (theory, section 15.5; in 3D to first order). Over
+    alpha the rates are ``problem.load_slope`` and ``problem.affine_friction[1]``.
 
     Parameters
     ----------
     problem : ContactProblem or ContactProblem3D
     root : Root
-        A regular one of ``enumerate_roots(problem, alpha)``, or one at which no node touches without force.
+        One of ``enumerate_roots(problem, alpha)``; in 3D one at which no node touches without force.
     load_rate : (n,) array_like
         Derivative of the load with respect to time [force / time].
+    friction_rate : number or (p,) array_like, in 3D also (p, 2)
+        Derivatives of the coefficients [1 / time].
 
     Raises
     ------
     InvalidArgumentError
-        ``root`` or ``load_rate`` cannot be used, friction depends on the solution, or a node touches without force.
+        ``root`` or a rate cannot be used, friction depends on the solution, or in 3D a node touches without force.
     TooLargeError
-        So many nodes are at their limit that not all ways can be tried, and no proof says that there is one only.
+        So many nodes are at their limit or without force that not all ways can be tried, and no proof says that there
+        is one only.
 
     Examples
     --------
@@ -119,56 +129,102 @@ def rates(problem: AnyProblem, root: Root, load_rate: ArrayLike) -> Rates:
     >>> enumsol.rates(problem, sliding, problem.f).jumps, enumsol.rates(problem, sliding, -problem.f).jumps
     (True, False)
     """
-    load = vector_of(load_rate, "load_rate", problem.n)
-    asked = Stabilities(problem, sp.eye_array(problem.n, format="csc"))
+    load, change = vector_of(load_rate, "load_rate", problem.n), _friction_rate(problem, friction_rate)
+    asked = Equilibria(problem, BodyMotions(problem, at_rest=True))
     asked.check(root)
+    F = friction_over(problem, root.alpha, root.alpha)
+    loaded = np.array([ContactStatus.OPEN not in active for active in root.active])
+    for i, axis in np.argwhere((np.transpose([f.mid for f in F]) == 0) & loaded[:, None] & (change != 0))[:1]:
+        raise InvalidArgumentError(
+            f"friction_rate is {change[i, axis]:g} at contact node {problem.node_ids[i]}, which is loaded and has no "
+            "friction at root; expected 0 there"
+        )
     if (reason := asked.not_known(root)) is not None:
         return Rates((), complete=False, reason=reason)
     parts = []
     for setting in asked.settings(root, every=True):
-        if setting.motions.touching:
-            raise InvalidArgumentError("a contact node touches without force at root; expected none that does")
-        found = _of_part(setting, load[setting.dofs])
+        if asked.body.tangents > 1 and setting.motions.touching:
+            raise InvalidArgumentError(
+                "a contact node touches without force at root, in 3D, where it may begin to slip in any direction; "
+                "expected none that does"
+            )
+        found = _of_part(setting, load[setting.dofs], _weakened(asked, root, setting, change))
         if isinstance(found, str):
             return Rates((), complete=False, reason=found)
-        parts.append([(setting, slides, y) for slides, y in found])
+        parts.append([(setting, way, y) for way, y in found])
     ways = tuple(_way(problem, load, choice) for choice in itertools.product(*parts))
     return Rates(ways, complete=True, reason="")
 
 
-def _of_part(setting: Setting, load: Floats) -> list[tuple[tuple[int, ...], Ball]] | str:
-    """Ways of one part of the body, or why they are not known: nodes that slide, and rates of forces."""
+def _friction_rate(problem: AnyProblem, given: ArrayLike) -> Floats:
+    """Rates of the coefficients by node and axis, (p, 1) or (p, 2)."""
+    rate, axes = real_array(given, "friction_rate", error=InvalidArgumentError), problem.contact_rows.shape[0]
+    axes = axes // problem.p - 1
+    if rate.shape not in ((), (problem.p,), (problem.p, axes)):
+        more = f" or {(problem.p, axes)}" if axes > 1 else ""
+        raise InvalidArgumentError(
+            f"friction_rate has shape {rate.shape}; expected a number or shape ({problem.p},){more}"
+        )
+    return np.broadcast_to(rate.reshape(problem.p, -1) if rate.ndim else rate, (problem.p, axes))
+
+
+def _weakened(asked: Equilibria, root: Root, setting: Setting, change: Floats) -> Ball | None:
+    """Rates that a change of friction adds to r of the nodes at their limit, (l,); None where it does not change."""
+    if not np.any(change[setting.limits]):
+        return None
+    assert root.enclosure is not None
+    p, place = asked.problem.p, {row: at for at, row in enumerate(setting.rows)}
+    forces = root.enclosure.lambda_t.reshape(p, -1, 2)
+    found = []
+    for k, i in enumerate(setting.limits):
+        # r is F' times y_n - d'(y_t / F), F' the larger coefficient, and R has F' d / F
+        total = Ball.exact(np.zeros(1))
+        for axis, F in enumerate(friction_over(asked.problem, root.alpha, root.alpha)):
+            if (row := place.get((axis + 1) * p + i)) is not None:
+                force = hull([Ball.exact(end) for end in forces[i, axis]])
+                share = setting.motions.moves[row, k : k + 1] * force * reciprocal(F[i])
+                total = total + share * Ball.exact(change[i, axis : axis + 1])
+        found.append(total)
+    return Ball.joined(*found)
+
+
+def _of_part(setting: Setting, load: Floats, more: Ball | None) -> list[tuple[Behaviour, Ball]] | str:
+    """Ways of one part of the body, or why they are not known, with the rates of forces."""
     stiffness, motions = setting.stiffness, setting.motions
     K, held = stiffness.at(0.0), stiffness.forces(load)
     if K is None or held is None:
         return "the stiffness of the contact nodes at rest is not enclosed"
     found = []
-    form = motions.slopes.T @ (K @ motions.moves)
-    one_way = positive(form.symmetric) if motions.limits else True
-    if not one_way and motions.limits > _LARGEST:
+    form = motions.slopes.T @ (K @ motions.moves[:, : motions.limits])
+    one_way = not motions.touching and (not motions.limits or positive(form.symmetric))
+    count = 2**motions.limits * 4 ** len(motions.touching)
+    if not one_way and count > _MOST_WAYS:
         raise TooLargeError(
-            f"{motions.limits} contact nodes are at their limit, and more than one way may go on; "
-            f"expected at most {_LARGEST}"
+            f"contact nodes at their limit or without force may go on in {count:,} ways, of which several may be true; "
+            f"expected at most {_MOST_WAYS:,}"
         )
-    tried = _pivots(form.mid, -(motions.slopes.mid.T @ held.mid)) if one_way else _all_sets(motions.limits)
-    for slides in tried:
-        answer, y = rates_in(K, motions, held, slides)
+    r = -(motions.slopes.mid.T @ held.mid) + (0.0 if more is None else more.mid)
+    for way in _pivots(form.mid, r) if one_way else _all_ways(motions):
+        answer, y = rates_in(K, motions, held, way, more)
         if answer is None:
-            return "a node at its limit may slide or stick, which rounding does not decide"
+            return "a node at its limit or without force may go on in two ways, between which rounding does not decide"
         if answer:
-            found.append((slides, y))
+            found.append((way, y))
     if one_way and not found:
         return "the only way to go on was not found"
     return found
 
 
-def _all_sets(count: int) -> Iterator[tuple[int, ...]]:
-    """All sets of so many nodes."""
-    for size in range(count + 1):
-        yield from itertools.combinations(range(count), size)
+def _all_ways(motions: Motions) -> Iterator[Behaviour]:
+    """All ways in which nodes at their limit and nodes without force may go on."""
+    codes = [(OPEN, STICK, SLIP_PLUS, SLIP_MINUS)[: 4 if node.slides else 2] for node in motions.touching]
+    for touching in itertools.product(*codes):
+        for size in range(motions.limits + 1):
+            for slides in itertools.combinations(range(motions.limits), size):
+                yield Behaviour(slides, touching)
 
 
-def _pivots(L: Floats, q: Floats) -> Iterator[tuple[int, ...]]:
+def _pivots(L: Floats, q: Floats) -> Iterator[Behaviour]:
     """The set that slides where every principal minor is positive (Murty's least index), one set."""
     chosen = np.zeros(len(q), dtype=bool)
     for _ in range(50 * (len(q) + 1)):
@@ -181,16 +237,21 @@ def _pivots(L: Floats, q: Floats) -> Iterator[tuple[int, ...]]:
         if not len(wrong):
             break
         chosen[wrong[0]] ^= True
-    yield tuple(np.flatnonzero(chosen).tolist())
+    yield Behaviour(tuple(np.flatnonzero(chosen).tolist()))
 
 
-def _way(problem: AnyProblem, load: Floats, parts: tuple[tuple[Setting, tuple[int, ...], Ball], ...]) -> Way:
+def _way(problem: AnyProblem, load: Floats, parts: tuple[tuple[Setting, Behaviour, Ball], ...]) -> Way:
     """A way to go on, in floats."""
-    forces, u, slides = np.zeros(problem.contact_rows.shape[0]), np.zeros(problem.n), []
-    for setting, own, y in parts:
+    forces, u = np.zeros(problem.contact_rows.shape[0]), np.zeros(problem.n)
+    slides: list[int] = []
+    opens: list[int] = []
+    for setting, way, y in parts:
         forces[setting.rows] = y.mid
         u[setting.dofs] = displacement(setting, 0.0, load[setting.dofs], y.mid)
-        slides += [setting.limits[i] for i in own]
+        slides += [setting.limits[i] for i in way.slides]
+        for node, code in zip(setting.touching, way.touching, strict=True):
+            opens += [node] if code == OPEN else []
+            slides += [node] if code in (SLIP_PLUS, SLIP_MINUS) else []
     lambda_t = forces[problem.p :]
     tangential = lambda_t if len(lambda_t) == problem.p else lambda_t.reshape(problem.p, -1, order="F")
-    return Way(tuple(sorted(slides)), u, forces[: problem.p], tangential)
+    return Way(tuple(sorted(slides)), tuple(sorted(opens)), u, forces[: problem.p], tangential)

@@ -37,6 +37,7 @@ _EXPLAINED = (
     "margin: distance to the next change of status, relative to the largest values",
 )
 #: Explains the column.
+_NO_FAMILIES = "families of solutions are not examined for stability"
 ABOUT_STABILITY = "stability: whether the body can leave it along a straight line, growing (proven where it is decided)"
 
 #: Rotations above this are not small [degrees]: their cosine differs from one by 1.5 percent.
@@ -257,7 +258,9 @@ class RootSet(Sequence[Root], Immutable):
         self._freeze()
 
     def stability(self, *, mass: ArrayLike | sp.sparray | sp.spmatrix | None = None) -> tuple[Stability, ...]:
-        """Which roots run away, one verdict a root in their order (see `enumsol.stability`); families are left out.
+        """Which roots run away, one verdict a root in their order (see `enumsol.stability`).
+
+        Families are not examined: what their nodes do changes from point to point.
 
         Printed root sets and tables have a column of them from then on, for the last mass that was asked for.
 
@@ -274,6 +277,7 @@ class RootSet(Sequence[Root], Immutable):
         from enumsol.roots.stability import Stabilities  # sparse graphs and solvers come with it
 
         if not len(self):
+            self._found["verdicts"] = ()
             return ()
         if mass is not None or "own" not in self._found:
             asked = Stabilities(self[0].problem, mass)
@@ -548,8 +552,9 @@ class RootSet(Sequence[Root], Immutable):
         return "\n".join([self._heading(), *table, *self._explained(), *self._notes()])
 
     def _explained(self) -> tuple[str, ...]:
-        more = [ABOUT_STABILITY] if self.verdicts is not None else []
-        return (*_EXPLAINED, *more) if len(self) else ()
+        asked = self.verdicts is not None
+        left_out = (_NO_FAMILIES,) if asked and self.families else ()
+        return (*_EXPLAINED, *((ABOUT_STABILITY,) if asked else ()), *left_out) if len(self) else left_out
 
     def _repr_html_(self) -> str:
         table = html_table(("root", *self._heads[1:]), self._rows()) if len(self) else ""

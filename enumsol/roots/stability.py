@@ -14,7 +14,7 @@ from enumsol.search.stability import Proven, StabilitySearch
 from enumsol.support.arguments import shown
 from enumsol.support.immutable import Sealed
 from enumsol.support.messages import counted
-from enumsol.trusted.motions_of_body import BodyMotions, Setting, friction_over
+from enumsol.trusted.motions_of_body import BodyMotions, Setting, friction_directions, friction_over
 from enumsol.trusted.running_away import Motion, everywhere
 
 if TYPE_CHECKING:
@@ -91,7 +91,7 @@ def stability(
     Raises
     ------
     InvalidArgumentError
-        There is no mass, friction depends on the solution, or ``root`` is no root of this problem.
+        There is no mass, friction depends on the solution, or ``root`` is no isolated root of this problem.
     InvalidProblemError
         The mass cannot be used.
 
@@ -109,7 +109,66 @@ def stability(
     return asked.of(root)
 
 
-class Stabilities:
+class Equilibria:
+    """Roots of one problem, and the motions that may begin there.
+
+    Attributes
+    ----------
+    problem : ContactProblem or ContactProblem3D
+    body : BodyMotions
+    """
+
+    def __init__(self, problem: AnyProblem, body: BodyMotions) -> None:
+        self.problem, self.body = problem, body
+
+    def check(self, root: Root) -> None:
+        """Refuse what is no root of this problem."""
+        if not hasattr(root, "enclosure"):
+            family = "a family of solutions" if hasattr(root, "polytopes") else shown(root)
+            raise InvalidArgumentError(f"root is {family}; expected an isolated root of enumerate_roots")
+        if root.problem is not self.problem and root.problem.fingerprint != self.problem.fingerprint:
+            raise InvalidArgumentError("root solves another problem; expected one of enumerate_roots(problem, alpha)")
+
+    def not_known(self, root: Root) -> str | None:
+        """Why the statuses of a root do not tell enough."""
+        if root.enclosure is None:
+            return "the root was found in floats, and its statuses are not proven"
+        if any(_OPEN in root.active[i] for i in self._unsure(root)):
+            return "a contact node may be open or touch, which the bounds of this root do not decide"
+        rubs = np.any([F.mid > 0 for F in friction_over(self.problem, root.alpha, root.alpha)], axis=0)
+        if any(rubs[i] and {_PLUS, _MINUS} <= root.active[i] for i in self._unsure(root)):
+            return "a contact node may be at either limit, which the bounds of this root do not decide"
+        return None
+
+    def settings(self, root: Root, *, every: bool = False) -> Iterator[Setting]:
+        """Parts of the body with nodes at their limit, or all."""
+        F = friction_over(self.problem, root.alpha, root.alpha)
+        known = None if self.body.tangents == 1 else root.enclosure
+        directions = None if known is None else friction_directions(known.lambda_t, F)
+        return self.settings_of(root.active, F, directions, self._unsure(root), every=every)
+
+    def settings_of(
+        self,
+        active: Sequence[frozenset[ContactStatus]],
+        F: list[Ball],
+        directions: Ball | None = None,
+        unsure: tuple[int, ...] = (),
+        *,
+        every: bool = False,
+    ) -> Iterator[Setting]:
+        """Parts of the body for statuses that hold, coefficients by axis and, in 3D, directions of friction (p, 2)."""
+        codes = [frozenset(_CODES[status] for status in statuses) for statuses in active]
+        return self.body.settings(codes, F, directions, unsure, every=every)
+
+    @staticmethod
+    def _unsure(root: Root) -> tuple[int, ...]:
+        """Nodes of which bounds alone say what they do, and leave more than one status."""
+        if root.regular or root.exact_slips is not None:
+            return ()
+        return tuple(i for i, statuses in enumerate(root.active) if len(statuses) > 1)
+
+
+class Stabilities(Equilibria):
     """Verdicts on roots of one problem; parts that nothing connects are examined by themselves and only once.
 
     Parameters
@@ -127,18 +186,8 @@ class Stabilities:
     """
 
     def __init__(self, problem: AnyProblem, mass: ArrayLike | sp.sparray | sp.spmatrix | None = None) -> None:
-        self.problem = problem
-        self.body = BodyMotions(problem, mass)
+        super().__init__(problem, BodyMotions(problem, mass))
         self._known: dict[Any, Proven] = {}
-
-    def check(self, root: Root) -> None:
-        """Refuse what is no root of this problem."""
-        if not hasattr(root, "enclosure"):
-            raise InvalidArgumentError(
-                f"root is {shown(root)}; expected a root of enumerate_roots, not a family of them"
-            )
-        if root.problem is not self.problem and root.problem.fingerprint != self.problem.fingerprint:
-            raise InvalidArgumentError("root solves another problem; expected one of enumerate_roots(problem, alpha)")
 
     def of(self, root: Root) -> Stability:
         """The verdict on one root."""
@@ -169,36 +218,6 @@ class Stabilities:
             reason = f"no motion grows with {counted(limits, 'contact node')} at the limit of friction"
         return Stability("does not run away", (), (), (), reason)
 
-    def not_known(self, root: Root) -> str | None:
-        """Why the statuses of a root do not tell enough."""
-        if root.enclosure is None:
-            return "the root was found in floats, and its statuses are not proven"
-        if any(_OPEN in root.active[i] for i in self._unsure(root)):
-            return "a contact node may be open or touch, which the bounds of this root do not decide"
-        rubs = np.any([F.mid > 0 for F in friction_over(self.problem, root.alpha, root.alpha)], axis=0)
-        if any(rubs[i] and {_PLUS, _MINUS} <= root.active[i] for i in self._unsure(root)):
-            return "a contact node may be at either limit, which the bounds of this root do not decide"
-        return None
-
-    def settings(self, root: Root, *, every: bool = False) -> Iterator[Setting]:
-        """Parts of the body with nodes at their limit, or all."""
-        forces = None if root.enclosure is None or self.body.tangents == 1 else root.enclosure.lambda_t
-        F = friction_over(self.problem, root.alpha, root.alpha)
-        return self.settings_of(root.active, F, forces, self._unsure(root), every=every)
-
-    def settings_of(
-        self,
-        active: Sequence[frozenset[ContactStatus]],
-        F: list[Ball],
-        forces: Floats | None = None,
-        unsure: tuple[int, ...] = (),
-        *,
-        every: bool = False,
-    ) -> Iterator[Setting]:
-        """Parts of the body for statuses that hold, coefficients by axis and, in 3D, bounds of lambda_t (p, 2, 2)."""
-        codes = [frozenset(_CODES[status] for status in statuses) for statuses in active]
-        return self.body.settings(codes, F, forces, unsure, every=every)
-
     def examined(self, root: Root) -> Iterator[tuple[Setting, Proven]]:
         """Parts of the body with nodes at their limit, and what is proven of them."""
         for setting in self.settings(root):
@@ -213,13 +232,6 @@ class Stabilities:
         if key not in self._known:
             self._known[key] = StabilitySearch(setting.stiffness, setting.motions).run()
         return self._known[key]
-
-    @staticmethod
-    def _unsure(root: Root) -> tuple[int, ...]:
-        """Nodes of which bounds alone say what they do, and leave more than one status."""
-        if root.regular or root.exact_slips is not None:
-            return ()
-        return tuple(i for i, statuses in enumerate(root.active) if len(statuses) > 1)
 
     def _shape(self, setting: Setting, motion: Motion) -> Floats:
         """Displacements of a motion that grows, (n,), in floats."""

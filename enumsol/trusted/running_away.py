@@ -8,6 +8,7 @@ its limit r_i = F y_n - s y_t = T_i'K(mu) R x is at least zero, too, and x_i r_i
 
 from __future__ import annotations
 
+import itertools
 from dataclasses import dataclass
 from fractions import Fraction
 from functools import cached_property
@@ -221,38 +222,100 @@ class NoMotion:
         ), (end, None)
 
 
-def rates_in(K: Ball, motions: Motions, held: Ball, slides: Sequence[int]) -> tuple[bool | None, Ball]:
-    """Test how nodes go on under a rate of load if some at their limit slide and others stay (theory, section 15.5).
+@dataclass(frozen=True)
+class Behaviour:
+    """Statuses of the nodes at their limit, as those that slide, and of those that touch, in one part of the body.
+
+    Attributes
+    ----------
+    slides : tuple of indices of the nodes at their limit that slide
+    touching : tuple of status codes
+        Of the nodes that touch without force.
+    """
+
+    slides: tuple[int, ...]
+    touching: tuple[int, ...] = ()
+
+    def equations(self, motions: Motions) -> tuple[Ball, list[int]] | None:
+        """Rows whose work vanishes, as columns, and the components that are not zero."""
+        rows, own = [motions.slopes[:, list(self.slides)]], list(self.slides)
+        for node, code in zip(motions.touching, self.touching, strict=True):
+            if code == OPEN:
+                columns = [node.leaves, *node.slides]
+                rows.append(motions.moves[:, columns])
+            elif code in (SLIP_PLUS, SLIP_MINUS) and len(node.slides) == 1:
+                columns = list(node.slides)
+                rows.append(_slope(motions, node, code))
+            elif code == STICK:
+                continue
+            else:
+                return None
+            own += columns
+        return Ball.beside(*rows), own
+
+    def signs(self, motions: Motions, x: Ball, forces: Ball, more: Ball | None = None) -> Ball:
+        """Numbers that are positive if every node strictly does what it is said to do; ``forces`` are -y, (m, 1).
+
+        ``more`` is what the rates of friction add to r of the nodes at their limit.
+        """
+        r = (motions.slopes.T @ forces)[:, 0]
+        r = r if more is None else r + more
+        signs = [x[i : i + 1] if i in self.slides else r[i : i + 1] for i in range(motions.limits)]
+        for node, code in zip(motions.touching, self.touching, strict=True):
+            if code == OPEN:
+                signs.append(x[node.leaves : node.leaves + 1])
+                continue
+            signs.append((motions.moves[:, [node.leaves]].T @ forces)[:, 0])
+            if code != STICK:
+                slip = x[list(node.slides)]
+                signs.append(slip if code == SLIP_PLUS else -slip)
+            elif len(node.slides) > 1:
+                signs.append(_room(motions, node, forces))
+            elif node.slides:
+                signs += [(_slope(motions, node, way).T @ forces)[:, 0] for way in (SLIP_PLUS, SLIP_MINUS)]
+        return Ball.joined(*signs) if signs else Ball.exact(np.zeros(0))
+
+
+def rates_in(
+    K: Ball, motions: Motions, held: Ball, way: Behaviour, more: Ball | None = None
+) -> tuple[bool | None, Ball]:
+    """Test how nodes go on under a rate of load if they do what is said of them (theory, section 15.5).
 
     Parameters
     ----------
     K : Ball (m, m)
         K(0).
     motions : Motions
-        None that touch.
+        In 3D none that touch.
     held : Ball (m,)
         Rates of the forces y with w = 0.
-    slides : indices of the nodes at their limit that slide
+    way : Behaviour
+    more : Ball (l,), optional
+        F' lambda_n of the nodes at their limit, if friction changes.
 
     Returns
     -------
     (answer, y)
-        Whether they do, strictly; False: no solution has them slide. None: neither is proven. y (m,) are the rates of
+        Whether they do, strictly; False: no solution has them do so. None: neither is proven. y (m,) are the rates of
         the forces.
     """
-    own, k = list(slides), len(motions.signed)
-    # r = -T'y and y = held - K R x
-    first = -(motions.slopes.T @ Ball(held.mid[:, None], held.rad[:, None]))
-    x = Ball.exact(np.zeros(k))
+    rows = way.equations(motions)
+    if rows is None:
+        return None, held
+    left, own = rows
+    x = Ball.exact(np.zeros(len(motions.signed)))
     if own:
-        moved = solution(_across(motions.slopes[:, own], K, motions.moves[:, own]), -first[own])
+        # left'(held - K R x) = more
+        goal = left.T @ Ball(held.mid[:, None], held.rad[:, None])
+        slid = list(way.slides)
+        if more is not None and slid:
+            goal[: len(slid)] = goal[: len(slid)] - Ball(more.mid[slid][:, None], more.rad[slid][:, None])
+        moved = solution(_across(left, K, motions.moves[:, own]), goal)
         if moved is None:
             return None, held
         x[own] = moved[:, 0]
     y = held - (K @ (motions.moves @ Ball(x.mid[:, None], x.rad[:, None])))[:, 0]
-    r = -(motions.slopes.T @ Ball(y.mid[:, None], y.rad[:, None]))[:, 0]
-    rest = [i for i in range(motions.limits) if i not in own]
-    signs = Ball.joined(x[own], r[rest])
+    signs = way.signs(motions, x, -Ball(y.mid[:, None], y.rad[:, None]), more)
     if np.any(signs.mid + signs.rad < 0):
         return False, y
     return (True if np.all(signs.mid - signs.rad > 0) else None), y
@@ -280,15 +343,12 @@ class Growing:
     Attributes
     ----------
     low, high : float
-    slides : tuple of indices of the nodes at their limit that slide
-    touching : tuple of status codes
-        Of the nodes that touch without force.
+    way : Behaviour
     """
 
     low: float
     high: float
-    slides: tuple[int, ...]
-    touching: tuple[int, ...] = ()
+    way: Behaviour
 
     def found(self, stiffness: Stiffness, motions: Motions) -> Motion | None:
         """The motion, if it is proven to be there."""
@@ -297,17 +357,17 @@ class Growing:
 
     def _found(self, stiffness: Stiffness, motions: Motions) -> Motion | None:
         k = len(motions.signed)
-        if motions.unsure or not 0 < self.low < self.high < np.inf or len(self.touching) != len(motions.touching):
+        slides, touching = self.way.slides, self.way.touching
+        if motions.unsure or not 0 < self.low < self.high < np.inf or len(touching) != len(motions.touching):
             return None
-        if list(self.slides) != sorted({*self.slides}) or not all(0 <= i < motions.limits for i in self.slides):
+        if list(slides) != sorted({*slides}) or not all(0 <= i < motions.limits for i in slides):
             return None
-        first, last, rows = stiffness.at(self.low), stiffness.at(self.high), self.equations(motions)
+        first, last, rows = stiffness.at(self.low), stiffness.at(self.high), self.way.equations(motions)
         if first is None or last is None or rows is None or not rows[1] or not stiffness.increases:
             return None
         left, own = rows
         right = motions.moves[:, own]
-        signs = [determinant_sign(_across(left, K, right)) for K in (first, last)]
-        if signs[0] * signs[1] >= 0:
+        if determinant_sign(_across(left, first, right)) * determinant_sign(_across(left, last, right)) >= 0:
             return None
         # K(low) <= K(mu) <= K(high)
         spread = np.sqrt(np.maximum((last - first).high.diagonal(), 0.0)) * (1 + 2.0**-40) + TINY
@@ -317,52 +377,8 @@ class Growing:
             return None
         x = Ball.exact(np.zeros(k))
         x[own] = vector[:, 0]
-        forces = K @ (right @ vector)
-        return Motion((self.low, self.high), x) if self._strict(motions, x, forces) else None
-
-    def equations(self, motions: Motions) -> tuple[Ball, list[int]] | None:
-        """Rows whose work vanishes, as columns, and the components that are not zero."""
-        rows, own = [motions.slopes[:, list(self.slides)]], list(self.slides)
-        for node, code in zip(motions.touching, self.touching, strict=True):
-            if code == OPEN:
-                columns = [node.leaves, *node.slides]
-                rows.append(motions.moves[:, columns])
-            elif code in (SLIP_PLUS, SLIP_MINUS) and len(node.slides) == 1:
-                columns = list(node.slides)
-                rows.append(_slope(motions, node, code))
-            elif code == STICK:
-                continue
-            else:
-                return None
-            own += columns
-        return Ball.beside(*rows), own
-
-    def _strict(self, motions: Motions, x: Ball, forces: Ball) -> bool:
-        """True if every node does what it is said to do, strictly; ``forces`` are K w = -y."""
-
-        def positive_number(value: Ball) -> bool:
-            return bool(np.all(value.mid - value.rad > 0))
-
-        for i in range(motions.limits):
-            if not positive_number(x[i : i + 1] if i in self.slides else motions.slopes[:, [i]].T @ forces):
-                return False
-        for node, code in zip(motions.touching, self.touching, strict=True):
-            if code == OPEN:
-                tests = [x[node.leaves : node.leaves + 1]]
-            else:
-                pressure = motions.moves[:, [node.leaves]].T @ forces
-                if code == STICK:
-                    if len(node.slides) > 1:
-                        return False
-                    both = (SLIP_PLUS, SLIP_MINUS) if node.slides else ()
-                    tests = [_slope(motions, node, slip).T @ forces for slip in both]
-                else:
-                    own = x[list(node.slides)]
-                    tests = [own if code == SLIP_PLUS else -own]
-                tests.append(pressure)
-            if not all(positive_number(test) for test in tests):
-                return False
-        return True
+        signs = self.way.signs(motions, x, K @ (right @ vector))
+        return Motion((self.low, self.high), x) if np.all(signs.mid - signs.rad > 0) else None
 
 
 @dataclass(frozen=True, eq=False)
@@ -373,34 +389,70 @@ class Crossing:
     ----------
     low, high : float
         Some motion grows for a mu between them.
-    push : (k,) array, >= 0
-        Rows r with these weights are negative at ``low`` for all x >= 0 but zero.
+    push : (k,) array, >= 0, or None
+        Rows r with these weights are negative at one end for all x >= 0 but zero; at the other the form is definite.
+    load : (k,) array or None
+        In place of ``push``: the ways in which the nodes go on under r = load at that end do not add up to one.
     """
 
     low: float
     high: float
-    push: Floats
+    push: Floats | None = None
+    load: Floats | None = None
 
     def holds(self, stiffness: Stiffness, motions: Motions) -> bool:
         """True if it is proven; only where no node touches and all are at their limit for certain."""
-        if motions.touching or motions.unsure or not 0 <= self.low < self.high < np.inf:
+        if motions.touching or motions.unsure or not 0 <= self.low < self.high < np.inf or not motions.limits:
             return False
-        if self.push.shape != (motions.limits,) or not np.all(np.isfinite(self.push)) or np.any(self.push < 0):
+        numbers = self.load if self.push is None else self.push
+        if numbers is None or numbers.shape != (motions.limits,) or not np.all(np.isfinite(numbers)):
             return False
         first, last = stiffness.at(self.low), stiffness.at(self.high)
-        if first is None or last is None or not motions.limits:
+        if first is None or last is None:
             return False
+        ends = (self.low, first), (self.high, last)
         with np.errstate(all="ignore"):
-            pushed = Ball.exact(self.push[None]) @ _across(motions.slopes, first, motions.moves)
-            return bool(np.all(pushed.mid + pushed.rad < 0)) and positive(
-                _across(motions.slopes, last, motions.moves).symmetric
+            return any(
+                positive(_across(motions.slopes, other, motions.moves).symmetric) and self._differs(motions, mu, K)
+                for (mu, K), (_, other) in (ends, ends[::-1])
             )
+
+    def _differs(self, motions: Motions, mu: float, K: Ball) -> bool:
+        """True if the degree of x -> min(x, L x) is proven not to be one, or L x >= 0 is complementary to some x."""
+        if self.push is not None:
+            pushed = Ball.exact(self.push[None]) @ _across(motions.slopes, K, motions.moves)
+            return bool(np.all(self.push >= 0) and np.all(pushed.mid + pushed.rad < 0))
+        # at rest a complementary x would be no motion that grows
+        return self.load is not None and mu > 0 and _degree(K, motions, self.load) not in (1, None)
+
+
+def _degree(K: Ball, motions: Motions, load: Floats) -> int | None:
+    """The sum of the signs of det L over all nodes that slide in 0 <= x, r = load + L x >= 0; None if not proven."""
+    k, total, none = motions.limits, 0, Ball.exact(np.zeros(len(K.mid)))
+    if 2**k > MOST_WAYS:
+        return None
+    for slides in itertools.chain.from_iterable(itertools.combinations(range(k), size) for size in range(k + 1)):
+        own = list(slides)
+        answer, _ = rates_in(K, motions, none, Behaviour(slides), Ball.exact(load))
+        sign = determinant_sign(_across(motions.slopes[:, own], K, motions.moves[:, own])) if answer and own else 1
+        if answer is None or not sign:
+            return None
+        total += sign if answer else 0
+    return total
 
 
 def _slope(motions: Motions, node: Touching, code: int) -> Ball:
     """T of a node that touches and begins to slip."""
     along, leaves = motions.moves[:, list(node.slides)], motions.moves[:, [node.leaves]]
     return leaves * Ball(node.F.mid.reshape(1, 1), node.F.rad.reshape(1, 1)) + (along if code == SLIP_PLUS else -along)
+
+
+def _room(motions: Motions, node: Touching, forces: Ball) -> Ball:
+    """A lower bound of F y_n - |y_t|, of a node in 3D that touches and sticks."""
+    pressure, along = (motions.moves[:, list(own)].T @ forces for own in ([node.leaves], node.slides))
+    size = float(np.linalg.norm(np.abs(along.mid) + along.rad)) * (1 + 2.0**-40)
+    friction = Ball(node.F.mid.reshape(1, 1), node.F.rad.reshape(1, 1))
+    return (friction * pressure)[:, 0] - Ball.exact(np.array([size]))
 
 
 def _null_vector(M: Ball) -> Ball | None:

@@ -35,8 +35,8 @@ def assert_as_searched(problem, graph, alphas):
             assert violation(problem, alpha, root.u, root.lambda_n, root.lambda_t) < 1e-8
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize("seed", [2, 3, 8, 24, 30])
+@pytest.mark.few(0, 3)
+@pytest.mark.parametrize("seed", [24, 2, 3, 8, 30])
 def test_all_solutions_of_random_bodies(seed):
     problem = over_alpha(seed)
     graph = proven_graph(problem, INTERVAL)
@@ -61,7 +61,7 @@ def assert_same_places(graph, plane):
     assert graph.steps[1:] == plane.steps[1:]
 
 
-@pytest.mark.slow
+@pytest.mark.few(0, 2)
 @pytest.mark.parametrize("seed", [1, 3, 6])
 def test_bodies_of_the_plane_have_the_vertices_that_exact_algebra_finds(seed):
     plane = whole_graph(plane_over_alpha(seed), INTERVAL)

@@ -11,7 +11,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 from alike import assert_same
-from complete import all_roots, complete_report, only_root, read_back, whole_graph
+from complete import all_roots, complete_report, graph_over_alpha, only_root, read_back, whole_graph
 from effort import some
 from interruptions import CtrlC, interrupted
 from problems3d import (
@@ -187,8 +187,7 @@ def test_what_was_found_is_kept_when_the_time_is_over_or_somebody_interrupts():
 @pytest.fixture(scope="module")
 def two_curves():
     """A problem that has a curve through the whole interval and one that has a fold, and its graph."""
-    problem = random_over_alpha(2, 1)
-    return problem, whole_graph(problem, (0, 1))
+    return graph_over_alpha(2, 1)
 
 
 def check_part(part, whole):
@@ -202,7 +201,7 @@ def check_part(part, whole):
         assert len(over_alpha) <= part.at_least(alpha) <= whole.multiplicity_at(alpha)
 
 
-@pytest.mark.few(1)
+@pytest.mark.few(1, 3)
 @pytest.mark.parametrize(
     ("where", "call"),
     [(chains, 20), (pieces, 8), (chains, 2), (pieces, 2)],
@@ -494,8 +493,7 @@ def test_vertices_of_the_same_bounds_are_not_in_an_order(graph):
 
 
 def test_counts_along_random_graphs_are_those_of_searches():
-    problem = random_over_alpha(2, 2)
-    graph = whole_graph(problem, (0, 1))
+    problem, graph = graph_over_alpha(2, 2)
     for alpha in np.linspace(0.03, 0.97, 4).tolist():
         known, found = enumsol.enumerate_roots(problem, alpha), graph.roots_at(alpha)
         assert known.complete

@@ -10,10 +10,17 @@ from oracles import exact_condense
 from proof_tools import records_of
 
 from enumsol import ContactProblem, branch_graph, verify
+from enumsol.branches.enclosed import tracing
 from enumsol.condensation.unloaded import vanishing_alpha
 
 INTERVAL = (0.0, 10.0)
 ZEROS = [Fraction(0), Fraction(10), Fraction(4), Fraction(1, 3), Fraction(22, 7), Fraction(-3), Fraction(5, 2)]
+
+
+@pytest.fixture(autouse=True)
+def few_boxes(monkeypatch):
+    """What stays open beside the zero stays so for any number of boxes, and takes most of the time."""
+    monkeypatch.setattr(tracing, "_MOST_BOXES", 20)
 
 
 def assert_proven(problem, interval=INTERVAL):

@@ -27,7 +27,7 @@ CHECKERS.append("enumsol.checker.stability_checker")
 IN_SPACE = {
     *("enumsol.checker.space_checker", "enumsol.condensation.space_condensed", "enumsol.model.sectors"),
     *inside("trusted.space", "resultants", "sector_margins", "sector_rows", "leaves", "boxed_solution"),
-    *inside("trusted.space", "product_forms", "natural_map", "krawczyk", "space_uniqueness", "turning"),
+    *inside("trusted.space", "natural_map", "krawczyk", "space_uniqueness", "turning"),
     *inside("trusted.space", "leaf_conditions", "leaf_equations"),
 }
 #: The search: its rooms, and what it alone uses of rooms that it shares with the checkers.
@@ -39,7 +39,8 @@ SEARCH = (
 #: What may write a false proof and accept it: of these modules the search uses no more than these names; None: all.
 SHARED = {
     "arithmetic.balls": {
-        *("Ball", "SAFE", "TINY", "UNIT", "factor_above", "nearly_singular", "smaller", "solution", "upper_norm")
+        *("Ball", "SAFE", "TINY", "UNIT", "factor_above", "hull", "nearly_singular"),
+        *("smaller", "solution", "upper_norm"),
     },
     "arithmetic.rationals": {
         *("as_objects", "is_positive_definite", "rational", "rational_matrix", "simplest", "to_fraction")
@@ -67,7 +68,9 @@ SHARED = {
     "trusted.uniqueness": {*("ClosedSolution", "closed_solution", "numbers_of", "only_solution", "same_solution")},
     "trusted.at_alpha": {"VerifiedSelection", "settled_selection", "solve_selection"},
     "trusted.precise_at_alpha": {"PreciseAtAlpha"},
-    "trusted.motions_of_body": {"BodyMotions", "Setting", "friction_over"},
+    "trusted.motions_of_body": {
+        *("BodyMotions", "Setting", "direction", "friction_directions", "friction_over", "reciprocal"),
+    },
     "trusted.running_away": None,
     "trusted.quadratic_forms": {"EnclosedForm", "Equations", "QuadraticForm"},
     "trusted.status_rows": None,
@@ -80,7 +83,6 @@ SHARED = {
     "trusted.space.boxed_solution": {
         *("Box", "BoxedSolution", "BoxProblem", "apart_in_boxes", "is_inside", "solution_in_box")
     },
-    "trusted.space.product_forms": {"CONE", "SIGNED", "Ellipsoid", "Frame", "refines"},
     "trusted.space.krawczyk": {"Contraction", "NaturalMap", "Step"},
     "trusted.space.solution_curve": None,
     "trusted.space.curve_chains": None,

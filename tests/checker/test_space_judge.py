@@ -31,7 +31,7 @@ COARSE = (
     "its root is not proven to be the only one in it",
     *("is not proven to be one from end to end", "it is not proven that all its solutions lie on its curve"),
     *("its roots are not proven to lie in its boxes", "its roots are not proven to be an arc through its box"),
-    *("it is not proven to hold no root", "its ellipsoid does not exclude it"),
+    *("it is not proven to hold no root",),
     *("its box is not proven to hold one solution", "its roots are not proven to lie in its box"),
     *("a place is not proven to be on its curve", "the box of a part of a curve is not proven to hold it"),
     *("the root that was declared is not proven to be the only one in it", "the root that was declared is not proven"),
@@ -162,7 +162,7 @@ def test_the_judge_accepts_what_the_checker_accepts(name):
     assert compare(problem, Proof(data)) == "both accept"
 
 
-@pytest.mark.few(3)
+@pytest.mark.few(3, 8)
 @pytest.mark.parametrize("name", QUICK, ids=str)
 def test_mutants_are_judged_alike(name):
     told = Counter(compare(found(name)[0], proof) for proof in mutants(name, 5 if name in GRAPHS else 15))
@@ -196,7 +196,7 @@ BORDERS = [
 ]
 
 
-@pytest.mark.few(1)
+@pytest.mark.few(1, 2)
 @pytest.mark.parametrize(("name", "leaf"), BORDERS, ids=str)
 def test_an_exclusion_at_its_very_border_is_refused(name, leaf):
     """Multipliers times the first float with which they exclude no more, upwards and downwards."""

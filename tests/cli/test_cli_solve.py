@@ -54,14 +54,14 @@ def test_from_a_mesh_to_the_roots(here, capsys):
 UNITS = "forces in kN, displacements in mm"
 
 
-@pytest.mark.parametrize("given", ["--units kN,mm", 'units = "kN,mm"', 'units = ["kN", "mm"]'])
 @pytest.mark.parametrize(
-    ("command", "said"),
+    ("command", "said", "given"),
     [
-        ("solve body.toml --alpha 0.5 --report page.html", UNITS),
-        ("roots body.toml --alpha 0.5 --report page.html", UNITS),
-        ("fixed-point body.toml --alpha 0.5", UNITS),
-        ("history body.toml --steps 0,0.5 --report page.html", "dissipated [kN mm]"),
+        ("solve body.toml --alpha 0.5 --report page.html", UNITS, "--units kN,mm"),
+        ("roots body.toml --alpha 0.5 --report page.html", UNITS, "--units kN,mm"),
+        ("roots body.toml --alpha 0.5 --report page.html", UNITS, 'units = "kN,mm"'),
+        ("fixed-point body.toml --alpha 0.5", UNITS, 'units = ["kN", "mm"]'),
+        ("history body.toml --steps 0,0.5 --report page.html", "dissipated [kN mm]", 'units = "kN,mm"'),
     ],
 )
 def test_units_stand_where_forces_and_displacements_do(here, capsys, command, said, given):

@@ -45,7 +45,20 @@ def test_without_a_mass_nothing_is_said_or_it_is_refused(capsys, tmp_path):
     assert "stability" not in printed(capsys, *bare)
     assert_refused(*run(capsys, *bare, "--stability"), "no mass and no mesh")
     space = ("graph", "gallery:one-node-3d-3", "--from", 0, "--to", 1, "--stability")
-    assert_refused(*run(capsys, *space), "one in 3D")
+    assert_refused(*run(capsys, *space), "no mass and no mesh")
+
+
+def test_tables_can_leave_out_what_runs_away(capsys):
+    table = ("table", "gallery:one-node-6.1", "--alphas", "1,5", "--without", "running away")
+    text = printed(capsys, *table)
+    assert "left out: how many roots run away" in text
+    assert "complete: yes (proven at all 2 alphas" in text
+    rows = json.loads(printed(capsys, *table, "--json", "-"))["rows"]
+    assert [(row["roots"], row["left_out"], row["stability_undecided"]) for row in rows] == [(1, 0, 0), (2, 1, 0)]
+    # floats prove no verdict
+    fast = printed(capsys, *table, "--arithmetic", "fast", status=3)
+    assert "complete: no (at 2 of 2 alphas: 1, 5)" in fast
+    assert_refused(*run(capsys, *table[:-1], "sliding"), "'sliding' is not one of 'running away'")
 
 
 def test_ctrl_c_keeps_the_graph(capsys, monkeypatch):

@@ -1,9 +1,10 @@
-"""Line 10: `> /dev/full` and a closed pipe give one line, at every verb and every output option."""
+"""`> /dev/full` and a closed pipe give one line, at every verb and every output option."""
 
 import json
 import os
 import subprocess
 import sys
+from itertools import product
 from pathlib import Path
 
 import pandas as pd
@@ -73,7 +74,8 @@ PRINTING = {
 }
 
 
-#: Runs each command in a process of its own, which begins with the libraries loaded and ends as any process does.
+#: Runs each command in a process of its own, once for each kind of stdout. It begins with the libraries loaded that the
+#: commands import, and ends as any process does.
 DRIVER = """
 import contextlib, gc, io, json, os, sys
 import enumsol, pandas
@@ -82,10 +84,12 @@ from enumsol.cli import main
 enumsol.branch_graph, enumsol.follow, enumsol.verify
 with contextlib.redirect_stdout(io.StringIO()):
     main(["--help"])
-    main(["roots", "gallery:one-node-6.1", "--alpha", "5"])
-where, commands = sys.argv[1], json.loads(sys.argv[2])
+    for verb in ("roots --alpha 5", "table --alphas 1", "report --from 0 --to 1 -o page.html", "fixed-point --alpha 1"):
+        name, *options = verb.split()
+        main([name, "gallery:one-node-6.1", *options])
+commands = json.loads(sys.argv[1])
 gc.freeze()  # or every process would touch, and so copy, all objects when it ends
-for name, arguments in commands.items():
+for where, name, arguments in commands:
     reading, writing = os.pipe()
     child = os.fork()
     if not child:
@@ -94,7 +98,7 @@ for name, arguments in commands.items():
     with open(reading) as errors:
         said = errors.read()
     status = os.waitstatus_to_exitcode(os.waitpid(child, 0)[1])
-    sys.stdout.write(json.dumps([name, status, said]) + chr(10))
+    sys.stdout.write(json.dumps([where, name, status, said]) + chr(10))
     sys.stdout.flush()
 else:
     sys.exit()
@@ -112,17 +116,16 @@ sys.exit(main(arguments))
 @pytest.fixture(scope="module")
 def outcomes(place):
     """Statuses and what stderr got, by kind of stdout and name of the command."""
-
-    def run_all(where):
-        commands = {name: [str(part) for part in arguments] for name, arguments in PRINTING.items()}
-        environment = {**os.environ, "OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1"}
-        done = subprocess.run(
-            [sys.executable, "-c", DRIVER, where, json.dumps(commands)], cwd=place, env=environment, text=True,
-            check=True, capture_output=True, timeout=600,
-        )  # fmt: skip
-        return {name: (status, said) for name, status, said in map(json.loads, done.stdout.splitlines())}
-
-    return {where: run_all(where) for where in ("full", "unread")}
+    commands = [
+        (where, name, [str(part) for part in arguments])
+        for where, (name, arguments) in product(("full", "unread"), PRINTING.items())
+    ]
+    environment = {**os.environ, "OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1"}
+    done = subprocess.run(
+        [sys.executable, "-c", DRIVER, json.dumps(commands)], cwd=place, env=environment, text=True,
+        check=True, capture_output=True, timeout=600,
+    )  # fmt: skip
+    return {(where, name): (status, said) for where, name, status, said in map(json.loads, done.stdout.splitlines())}
 
 
 @pytest.mark.slow
@@ -135,7 +138,7 @@ def outcomes(place):
     ],
 )
 def test_stdout_on_a_full_disk_or_that_nobody_reads(outcomes, where, said, status, name):
-    ended, err = outcomes[where][name]
+    ended, err = outcomes[where, name]
     assert_one_line(err, said)
     assert ended == status
 

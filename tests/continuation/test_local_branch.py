@@ -131,9 +131,10 @@ def counts_near(S, g, F, forces, size=1e-6):
     ("p", "seeds"),
     [
         (1, (0, 2, 3)),
-        pytest.param(1, range(24), marks=pytest.mark.slow),
-        pytest.param(2, range(12), marks=pytest.mark.slow),
-        pytest.param(2, range(12, 100), marks=pytest.mark.long),
+        pytest.param(1, range(16, 24), marks=pytest.mark.slow),
+        pytest.param(2, range(4), marks=pytest.mark.slow),
+        pytest.param(1, range(24), marks=pytest.mark.long),
+        pytest.param(2, range(100), marks=pytest.mark.long),
     ],
 )
 def test_where_statuses_meet_in_3d_against_enumeration(p, seeds):

@@ -1,4 +1,4 @@
-"""Decks and other files of text that meshio reads in part, each refused; and what types of elements stand for."""
+"""Meshes of decks, what types of elements stand for, and other files of text that meshio reads in part."""
 
 import meshio
 import numpy as np
@@ -29,6 +29,7 @@ def deck(tmp_path):
     return written
 
 
+COMMENT = "** a comment\n"
 WHOLE = [
     ("", ""),
     ("1, 2, 3\n** end", "1, 2,\n3,\n** end"),
@@ -36,6 +37,16 @@ WHOLE = [
     ("*ELSET, ELSET=LOW\n1, 2\n", "*ELSET, ELSET=LOW, GENERATE\n1, 2, 1\n"),
     ("*ELSET, ELSET=LOW\n1, 2\n", "*ELSET, ELSET=LOW\nBODY\n"),
     (NODES, NODES + "10, 7., 7.\n"),
+    (CELLS[2], COMMENT + CELLS[2]),
+    (NODES[:30], NODES[:30] + COMMENT),
+    ("** cells\n", "*NODE\n11, 5., 5.\n"),
+    ("1, 2, 3\n", "1, 2,\n** right half\n3\n"),
+    ("1, 2, 3\n", "1, 2\n*NSET, NSET=FLOOR\n3\n"),
+    ("1, 2, 3\n", "1, 2\n*nset, nset=Floor\n3\n"),
+    ("1, 2, 3\n", "1 , 2 , 3\n"),
+    ("ELSET=LOW\n1, 2\n", "ELSET=LOW\n1,\n** and\n2\n"),
+    ("".join(CELLS), "".join(CELLS[:3]) + "*ELEMENT, TYPE=CPS4, ELSET=BODY\n" + CELLS[3]),
+    ("*STEP\n", "*STEP\n*CLOAD\nFLOOR, 1, 2.\n*NO SUCH CARD\n"),
 ]
 
 
@@ -57,36 +68,29 @@ def test_a_deck_that_includes_its_mesh_is_read_whole(deck):
     assert mesh.nodes("FLOOR").tolist() == [0, 1, 2]
 
 
-COMMENT = "** a comment\n"
-LOST = [
-    (CELLS[2], COMMENT + CELLS[2], "2 of 4 cells of a block .ELEMENT are read, .* comment at line 18; expected blocks"),
-    (NODES[:30], NODES[:30] + COMMENT, r"not all of 9 nodes are read, for \*NODE .* at line 8; expected one block"),
-    ("** cells\n", "*NODE\n11, 5., 5.\n", r"nodes are read, for \*NODE .* at line 14"),
-    ("1, 2, 3\n", "1, 2,\n** right half\n3\n", "the set FLOOR is read with 2 of its 3 nodes, .* at line 22; expected"),
-    ("1, 2, 3\n", "1, 2\n*NSET, NSET=FLOOR\n3\n", "the set FLOOR is read with 1 of its 3 nodes, .* at line 22;"),
-    ("1, 2, 3\n", "1, 2\n*NSET, NSET=Floor\n3\n", "the set FLOOR is read with 2 of its 3 nodes"),
-    ("1, 2, 3\n", "1 , 2 , 3\n", "the set FLOOR is read with 0 of its 3 nodes"),
-    ("*STEP\n", "*NSET, NSET=HELD\nFLOOR, ROOF\n*STEP\n", "the set HELD is read with 0 of its 6 nodes"),
-    ("ELSET=LOW\n1, 2\n", "ELSET=LOW\n1,\n** and\n2\n", "the set LOW is read with 1 of its 2 cells"),
-    ("*STEP\n", "*NGEN\n1, 3, 1\n*STEP\n", r"\*NGEN at line 27 makes or moves nodes or cells"),
-    ("*STEP\n", "*INSTANCE, NAME=A, PART=P\n0., 1., 0.\n*STEP\n", r"\*INSTANCE at line 27 moves a part"),
-    ("*STEP\n", "*INSTANCE, NAME=A\n*INSTANCE, NAME=B\n", "the deck has 2 instances of parts"),
-]
+def test_sets_of_sets(deck):
+    mesh = fem.read_mesh(deck("*STEP\n", "*NSET, NSET=HELD\nFLOOR, ROOF\n*STEP\n"))
+    assert mesh.nodes("HELD").tolist() == [0, 1, 2, 6, 7, 8]
 
 
-@pytest.mark.parametrize(("old", "new", "message"), LOST)
-def test_decks_that_are_read_in_part(deck, old, new, message):
-    place = deck(old, new)
+def test_surfaces_are_facets(deck):
+    """Beside the facets of node sets, by the faces of elements."""
+    mesh = fem.read_mesh(deck("*STEP\n", "*SURFACE, NAME=SIDE\n1, S4\n3, S4\n*STEP\n"))
+    assert sorted(mesh.part("SIDE").tolist()) == [[3, 0], [6, 3]]
+    assert np.sort(mesh.part("FLOOR"), axis=1).tolist() == [[0, 1], [1, 2]]
+
+
+@pytest.mark.parametrize(
+    ("new", "message"),
+    [
+        ("*NGEN\n1, 3, 1\n*STEP\n", r"deck.inp line 27: \*NGEN makes or moves nodes or elements"),
+        ("*INSTANCE, NAME=A, PART=P\n0., 1., 0.\n*STEP\n", r"line 27: \*INSTANCE is of the part P, which is not"),
+        ("*NSET, NSET=ALL\nNONE\n", "line 28: there is no set of nodes named NONE; expected"),
+    ],
+)
+def test_decks_that_cannot_be_read(deck, new, message):
+    place = deck("*STEP\n", new)
     assert str(bad_argument(message, fem.read_mesh, place)).startswith(f"{place}: ")
-
-
-def test_sets_of_several_blocks_of_elements(deck):
-    """meshio gives all of them the cells of the last."""
-    first, last = "".join(CELLS[:3]), CELLS[3]
-    begin = "*ELEMENT, TYPE=CPS4, ELSET=BODY\n"
-    bad_argument("the set BODY is read with .* of its 4 cells", fem.read_mesh, deck(first, first + begin))
-    unnamed = deck(begin + first + last, "*ELEMENT, TYPE=CPS4\n" + first + begin + last)
-    bad_argument("the set BODY is read with 0 of its 1 cells", fem.read_mesh, unnamed)
 
 
 GIVEN = {"young": 2.0, "poisson": 0.3, "contact": "FLOOR", "clamp": "ROOF", "friction": 0.3, "gap": -0.01}
@@ -101,7 +105,9 @@ def test_plane_stress_has_to_be_said(deck):
     assert fem.mesh_problem(deck(), **GIVEN, plane="stress").fingerprint != strain.problem().fingerprint
 
 
-@pytest.mark.parametrize(("name", "what"), [("S4", "shells"), ("S4R", "shells"), ("CAX4P", "no plane elements")])
+@pytest.mark.parametrize(
+    ("name", "what"), [("S4", "shells"), ("S4R", "shells"), ("M3D4", "membranes"), ("R3D4", "rigid surfaces")]
+)
 def test_elements_of_other_bodies(deck, name, what):
     bad_argument(f"elements of type {name}, which are {what}; expected solid", fem.read_mesh, deck("CPS4", name))
 
@@ -129,7 +135,7 @@ def test_collapsed_and_folded_elements_by_their_numbers(deck):
     bad_argument("element 44 is flat, folded or inside out", fem.mesh_problem, folded, **GIVEN, plane="strain")
     points = "1,0,0,0\n2,1,0,0\n3,0,1,0\n4,0,0,1\n5,1,0,1\n6,0,1,1\n"
     folded.write_text(f"*NODE\n{points}*ELEMENT, TYPE=C3D8\n11, 1, 2, 3, 3, 4, 5, 6, 6\n*NSET, NSET=A\n1, 2, 3\n")
-    bad_argument("element 11 names a node twice, as one that is collapsed to a wedge", fem.read_mesh, folded)
+    bad_argument("the mesh has cells of type wedge", fem.read_mesh, folded)
 
 
 @pytest.mark.parametrize(

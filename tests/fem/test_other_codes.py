@@ -15,6 +15,7 @@ from two_bodies import shifted, together
 
 import enumsol
 from enumsol import fem
+from enumsol.io import read_abaqus_stiffness, read_ansys_stiffness, read_calculix_stiffness
 
 #: Of CalculiX 2.20: the model, its stiffness matrix with the names of its rows, and nodal forces.
 FILES = Path(__file__).parent / "calculix"
@@ -51,6 +52,10 @@ def test_roots_of_the_matrices_of_calculix_are_our_own(seen, own):
     assert enumsol.read_problem(seen["folder"] / "block.npz").fingerprint == seen["block"].fingerprint
 
 
+def matrix(found):
+    return found.A, found.places
+
+
 def same(one, two):
     """Whether both name the same degrees of freedom and have the same stiffness between them."""
     (A, first), (B, second) = one, two
@@ -59,16 +64,17 @@ def same(one, two):
 
 
 @pytest.mark.parametrize("both", [False, True])
-def test_the_format_of_abaqus(seen, tmp_path, both):
+def test_the_format_of_abaqus(tmp_path, both):
     """One triangle or both, nodes in another order, held ones with a large number on the diagonal."""
-    A, places = seen["from_calculix"](str(FILES / "block"))
+    A, places = matrix(read_calculix_stiffness(FILES / "block"))
     lines = [f"{node},{d}, {node},{d},  1.000000000000000e+36" for node in (1, 4, 7, 10) for d in (1, 2, 3)]
     names = list(places)
     for i in reversed(range(len(names))):
         listed = [j for j in range(len(names) if both else i + 1) if A[i, j]]
         lines += ["{},{}, {},{},  {!r}".format(*names[i], *names[j], float(A[i, j])) for j in listed]
     (tmp_path / "block_STIF1.mtx").write_text("\n".join(lines) + "\n")
-    assert same(seen["from_abaqus"](tmp_path / "block_STIF1.mtx", held=(1, 4, 7, 10)), (A, places))
+    found = read_abaqus_stiffness(tmp_path / "block_STIF1.mtx", held=(1, 4, 7, 10))
+    assert same(matrix(found), (A, places))
 
 
 @pytest.mark.parametrize(
@@ -79,17 +85,19 @@ def test_the_format_of_abaqus(seen, tmp_path, both):
         (sp.triu, "general", [], "{} {} {}"),  # one triangle, and all the same called general
     ],
 )
-def test_the_format_of_ansys(seen, tmp_path, part, symmetry, heading, row):
-    A, places = seen["from_calculix"](str(FILES / "block"))
+def test_the_format_of_ansys(tmp_path, part, symmetry, heading, row):
+    A, places = matrix(read_calculix_stiffness(FILES / "block"))
     mmwrite(tmp_path / "block.mtx", sp.coo_array(part(A)), symmetry=symmetry, precision=17)
     lines = [row.format(k + 1, node, LABELS[d - 1]) for k, (node, d) in enumerate(places)]
     (tmp_path / "block.mapping").write_text("\n".join([*heading, *lines]) + "\n")
-    assert same(seen["from_ansys"](str(tmp_path / "block")), (A, places))
+    found = read_ansys_stiffness(tmp_path / "block.mtx", tmp_path / "block.mapping")
+    assert same(matrix(found), (A, places))
 
 
-def test_two_bodies_that_calculix_assembled_have_our_own_roots(seen):
+def test_two_bodies_that_calculix_assembled_have_our_own_roots():
     """A small block between the nodes of a larger one; what its nodes face is interpolated by hand."""
-    A, places = seen["from_calculix"](str(FILES / "pair"))
+    model = read_calculix_stiffness(FILES / "pair")
+    A, places = matrix(model)
     points = {int(k): at for k, *at in map(numbers, section(FILES / "pair.inp", "*NODE"))}
     slave = [k for k, at in points.items() if at[2] == 0.5 and k <= 8]
     under = {(round(at[0], 9), round(at[1], 9)): k for k, at in points.items() if at[2] == 0.5 and k > 8}
@@ -131,3 +139,33 @@ def section(file, keyword):
     first = next(k for k, line in enumerate(lines) if line.startswith(keyword)) + 1
     last = next(k for k in range(first, len(lines)) if lines[k].startswith("*"))
     return lines[first:last]
+
+
+@pytest.mark.parametrize(
+    ("files", "call", "message"),
+    [
+        ({}, lambda at: read_calculix_stiffness(at / "none"), "cannot be read"),
+        ({"a.sti": "1 1 x\n"}, lambda at: read_calculix_stiffness(at / "a"), "does not hold a stiffness matrix"),
+        (
+            {"a.sti": "2 2 1.0\n", "a.dof": "1.1\n"},
+            lambda at: read_calculix_stiffness(at / "a"),
+            "has 2 rows and 1 rows by",
+        ),
+        ({"a.sti": "2 2 1.0\n", "a.dof": "1.1\n1.1\n"}, lambda at: read_calculix_stiffness(at / "a"), "twice"),
+        ({"a.mtx": "1,1,1\n"}, lambda at: read_abaqus_stiffness(at / "a.mtx"), "does not hold a stiffness matrix"),
+        ({"a.mtx": "no matrix"}, lambda at: read_ansys_stiffness(at / "a.mtx", at / "a.map"), "does not hold"),
+    ],
+)
+def test_damaged_matrices_are_refused(tmp_path, files, call, message):
+    for name, text in files.items():
+        (tmp_path / name).write_text(text)
+    with pytest.raises(enumsol.InvalidArgumentError, match=message):
+        call(tmp_path)
+
+
+def test_held_nodes_have_no_rows():
+    model = read_calculix_stiffness(FILES / "block")
+    with pytest.raises(enumsol.InvalidArgumentError, match="node 1 has no free displacement in direction 3"):
+        model.displacements([2, 1], (0, 0, 1))
+    assert model.displacements([2, 3], [(1, 0, 0), (0, 1, 0)]).nnz == 2
+    assert not np.any(model.forces([(1, 3, 5.0)]))

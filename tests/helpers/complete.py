@@ -1,5 +1,9 @@
 """Results that leave nothing open: enumerations, graphs, what the checker says of proofs, limits of iterations."""
 
+import functools
+
+from problems3d import random_over_alpha
+
 from enumsol import branch_graph, enumerate_roots, successive_approximations, verify
 
 
@@ -28,6 +32,13 @@ def whole_graph(problem, interval, *arguments, **options):
     graph = branch_graph(problem, interval, *arguments, **options)
     assert graph.complete, graph
     return graph
+
+
+@functools.cache
+def graph_over_alpha(p, seed):
+    """Such a graph over [0, 1] of the random problem in 3D with this seed, made once in a process, and that problem."""
+    problem = random_over_alpha(p, seed)
+    return problem, whole_graph(problem, (0, 1))
 
 
 def proven_graph(problem, interval, *arguments, **options):

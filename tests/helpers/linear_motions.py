@@ -63,3 +63,42 @@ def setting(A, M, Bn, Bt, F, kinds, signs, unsure=()):
     motions = Motions(moves, leans, signed, tuple(touching), unsure)
     sparse = sp.csc_array(A), sp.csc_array(M), sp.csr_array(np.array(rows))
     return DynamicStiffness(*sparse), motions
+
+
+def random_motion_in_space(rng):
+    """A, M, Bn, W, kinds and directions as `growing_in_space` takes them, with one node that touches, and F (p, 2)."""
+    p = int(rng.integers(1, 4))
+    n = 3 * p + int(rng.integers(0, 3))
+    X = rng.normal(size=(n, n))
+    A = X @ X.T + 10.0 ** rng.uniform(-2, 1) * np.eye(n)
+    rows = rng.normal(size=(3 * p, n)) if rng.random() < 0.5 else np.eye(n)[: 3 * p]
+    Y = rng.normal(size=(n, n))
+    M = [np.eye(n), np.diag(10.0 ** rng.uniform(-1, 1, n)), Y @ Y.T + 0.1 * np.eye(n)][rng.integers(3)]
+    F = rng.choice([0.3, 0.7, 1.5, 3.0], size=(p, 2))
+    kinds = ["touching", *(str(rng.choice(["open", "stuck", "limit", "limit"])) for _ in range(p - 1))]
+    angle = rng.uniform(-np.pi, np.pi, p)
+    W = np.stack([rows[p : 2 * p], rows[2 * p :]], axis=1) * F[:, :, None]
+    return A, M, rows[:p], W, kinds, np.stack([np.cos(angle), np.sin(angle)], axis=1), F
+
+
+def setting_in_space(A, M, Bn, W, kinds, directions, F):
+    """The dynamic stiffness and the motions made of them; tangential rows are those without F."""
+    touch = [i for i, kind in enumerate(kinds) if kind != "open"]
+    rows = [*Bn[touch], *(W[i] / F[i][:, None] for i in touch)]
+    place = {i: at for at, i in enumerate(touch)}
+    size, columns, slopes, touching = 3 * len(touch), [], [], []
+    for i in (i for i in touch if kinds[i] == "limit"):
+        of = np.zeros(size)
+        of[len(touch) + 2 * place[i] :][:2] = directions[i] / F[i]
+        columns.append(of)
+        slopes.append(of - np.eye(size)[place[i]])
+    for i in (i for i in touch if kinds[i] == "touching"):
+        start, own = len(columns), len(touch) + 2 * place[i]
+        columns += [-np.eye(size)[place[i]], *np.eye(size)[own : own + 2]]
+        touching.append(Touching(start, (start + 1, start + 2), Ball.exact(np.array(min(F[i])))))
+    signed = np.ones(len(columns), dtype=bool)
+    for node in touching:
+        signed[list(node.slides)] = False
+    moves, leans = (Ball.exact(np.array(of).reshape(-1, size).T.copy()) for of in (columns, slopes))
+    sparse = sp.csc_array(A), sp.csc_array(M), sp.csr_array(np.vstack(rows))
+    return DynamicStiffness(*sparse), Motions(moves, leans, signed, tuple(touching))

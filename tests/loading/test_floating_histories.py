@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 from alike import assert_close, assert_same
 from complete import accepted_report, complete_report, read_back
+from effort import some
 from flint import fmpq
 from floating_histories import agreed, case
 from floating_oracle import Oracle, random_body, rational
@@ -87,10 +88,11 @@ def test_random_bodies_in_balls_against_rationals_step_by_step(seed):
 
 @pytest.mark.slow
 def test_such_histories_are_complete_slide_and_have_none_and_several_roots():
-    found = [agreed(*case(seed)) for seed in range(60, 120)]
+    count, first = some(20, of=60), some(82, of=60)
+    found = [agreed(*case(seed)) for seed in range(first, first + count)]
     slid = [history for history in found if any(stage.start.radius is not None for stage in history.data.stages)]
-    assert sum(history.complete for history in slid) > 20
-    assert sum(history.counts[-1] == 0 for history in found if history.complete) > 2
+    assert sum(history.complete for history in slid) > count // 3
+    assert sum(history.counts[-1] == 0 for history in found if history.complete) > count // 30
     assert sum(bool(history.branchings) for history in found) > 0
 
 
@@ -239,7 +241,7 @@ def pulls_and_positions(tangents, count, seed):
     return found
 
 
-@pytest.mark.parametrize(("tangents", "count"), [(1, 10), (2, 4), pytest.param(2, 40, marks=pytest.mark.slow)])
+@pytest.mark.parametrize(("tangents", "count"), [(1, 10), (2, 4), pytest.param(2, 40, marks=pytest.mark.long)])
 def test_two_weights_on_a_spring(tangents, count):
     problem, known = two_weights(tangents), pulls_and_positions(tangents, count, 1)
     loads = []

@@ -103,11 +103,11 @@ def pushed_to_and_fro(shares):
 
 @pytest.mark.slow
 def test_a_block_is_pushed_to_and_fro_and_then_away(tmp_path):
-    block, loads = pushed_to_and_fro([0.3, 0.6, -0.3, -0.6, 1.2, 0.0])
+    block, loads = pushed_to_and_fro([0.3, 0.6, -0.6, 1.2, 0.0])
     history = enumsol.histories(block, loads)
-    assert (history.counts, history.complete, history.unique_until) == ((1, 1, 1, 1, 0, 0), True, 4)
+    assert (history.counts, history.complete, history.unique_until) == ((1, 1, 1, 0, 0), True, 3)
     report = complete_report(block, history.proof)
-    assert report.unique_until == 4
+    assert report.unique_until == 3
     assert report.within is None or f"rigid displacements of {report.within:g}" in history.closing_line
     radii = [stage.largest_radius for stage in history.data.stages]
     assert 0 < radii[-1] < 1e-9
@@ -144,7 +144,7 @@ def test_every_offset_in_a_ball_leads_into_the_ball_of_positions():
     assert by_leaf is not None
     by_forces = tangential_positions(wide, Fraction(0), known[0], still, start.ball, rigid=known[1])
     assert np.all(by_leaf.rad < np.minimum(20 * radius, 0.01 * by_forces.rad))
-    for _ in range(4):
+    for _ in range(2):
         other = offset + radius * rng.choice([-0.999, 0.999], offset.shape)
         (one,) = enumsol.enumerate_roots(problem.replace(slip_offset=other), 0)
         moved = (other + one.u_t).T.ravel()

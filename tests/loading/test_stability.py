@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 import enumsol
+from enumsol.branches.stability import Span
 
 QUIET, AWAY = "does not run away", "runs away"
 
@@ -67,6 +68,20 @@ def test_it_needs_a_mass(triangle):
         np.eye(2), [[1, 0]], [[0, 1]], [1, 0], friction=0.5, load_slope=[0, 1], mass=np.eye(2)
     )
     assert {found.verdict for found in enumsol.histories(heavy, [0.25, 1]).stability().values()} == {QUIET}
+
+
+def test_maps_with_undecided_verdicts_are_not_complete(triangle, monkeypatch):
+    def undecided(graph):
+        return tuple((Span(arc.lo, arc.hi, "undecided"),) for arc in graph.arcs)
+
+    monkeypatch.setattr(enumsol.BranchGraph, "stability", undecided)
+    found = enumsol.multiplicity_map(triangle, (0, 3), {"gap": [0.0]}, without="running away")
+    (row,) = found.rows
+    assert (row.between, row.undecided, row.exact, row.complete) == ((1, 3), (1, 3), False, False)
+    assert not found.complete
+    assert "0-1 0-3" in repr(found)
+    assert found.closing_line == "complete: no (at 1 of 1 value it is not decided whether some solutions run away)"
+    assert not found.to_frame()["exact"].any()
 
 
 def test_maps_can_leave_out_what_runs_away(triangle):

@@ -71,7 +71,7 @@ def test_a_wedge_pulled_straight_is_its_own_mirror_image():
 
 
 @pytest.mark.few(0, 1)
-@pytest.mark.parametrize(("size", "friction", "count"), [((1, 1, 2), 2, 5), ((2, 1, 2), 1, 3)], ids=str)
+@pytest.mark.parametrize(("size", "friction", "count"), [((2, 1, 2), 1, 3), ((1, 1, 2), 2, 5)], ids=str)
 def test_eight_nodes_on_weak_springs(size, friction, count):
     """The wall hardly resists a motion of all nodes together: S has eigenvalues far apart."""
     problem = enumsol.gallery.wedge3d(*size, friction=friction, multipliers="nodes")

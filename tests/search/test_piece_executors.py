@@ -4,7 +4,7 @@ import os
 from concurrent.futures import ProcessPoolExecutor, ThreadPoolExecutor
 
 import pytest
-from complete import complete_report, whole_graph
+from complete import complete_report, graph_over_alpha, whole_graph
 from dying import DyingExecutor
 from interruptions import CtrlC, interrupted
 from problems3d import random_over_alpha
@@ -61,8 +61,7 @@ def same(one, other):
 
 
 def test_small_tasks_give_the_same_curves(small_tasks):
-    problem = random_over_alpha(1, 3)
-    alone = whole_graph(problem, (0, 1))
+    problem, alone = graph_over_alpha(1, 3)
     seen = []
     one, three = (
         whole_graph(problem, (0, 1), executor=executor, progress=lambda *state: seen.append(state))
@@ -91,8 +90,7 @@ def test_curves_that_are_met_late_are_the_same(small_tasks, curves_met_late):
 
 @pytest.mark.slow
 def test_the_same_graph_and_proof_with_any_workers(executors):
-    problem = random_over_alpha(2, 1)
-    alone = whole_graph(problem, (0, 1))
+    problem, alone = graph_over_alpha(2, 1)
     first, *others = (whole_graph(problem, (0, 1), executor=executor) for executor in executors)
     assert all(same(first, other) for other in others)
     assert arcs_of(first) == arcs_of(alone)
@@ -126,8 +124,7 @@ def test_what_was_found_is_kept_when_somebody_interrupts(small_tasks):
 @pytest.mark.slow
 @pytest.mark.parametrize("healthy", [0, 2])
 def test_a_lost_worker_costs_time_and_nothing_else(healthy):
-    problem = random_over_alpha(2, 1)
-    alone = whole_graph(problem, (0, 1))
+    problem, alone = graph_over_alpha(2, 1)
     with ProcessPoolExecutor(2) as pool, pytest.warns(RuntimeWarning, match="a worker died"):
         graph = whole_graph(problem, (0, 1), executor=DyingExecutor(pool, healthy, os._exit, 1))
     assert arcs_of(graph) == arcs_of(alone)

@@ -9,7 +9,7 @@ from linear_motions import random_motion, setting
 
 from enumsol.arithmetic.balls import Ball
 from enumsol.search.stability import StabilitySearch
-from enumsol.trusted.running_away import Growing, Motions, NoMotion, Touching, covers, everywhere
+from enumsol.trusted.running_away import Behaviour, Growing, Motions, NoMotion, Touching, covers, everywhere
 
 
 def numbers(rng, value):
@@ -52,9 +52,12 @@ def mutant_of_no_motion(rng, leaf):
 def mutant_of_growing(rng, leaf, motions):
     field = rng.choice(["low", "high", "slides", "touching"])
     if field == "touching":
-        return dataclasses.replace(leaf, touching=tuple(rng.integers(-1, 5, len(motions.touching) + rng.integers(2))))
-    changed = indices(rng, leaf.slides, motions.limits) if field == "slides" else numbers(rng, getattr(leaf, field))
-    return dataclasses.replace(leaf, **{field: changed})
+        codes = tuple(rng.integers(-1, 5, len(motions.touching) + rng.integers(2)))
+        return dataclasses.replace(leaf, way=dataclasses.replace(leaf.way, touching=codes))
+    if field == "slides":
+        changed = indices(rng, leaf.way.slides, motions.limits)
+        return dataclasses.replace(leaf, way=dataclasses.replace(leaf.way, slides=changed))
+    return dataclasses.replace(leaf, **{field: numbers(rng, getattr(leaf, field))})
 
 
 def check(seed, count):
@@ -68,7 +71,7 @@ def check(seed, count):
     leaves = [leaf for _, _, own in proven.ranges for leaf in own]
     leaves = leaves or [NoMotion(0.0, 1.0, None, (), (), np.eye(k), (np.zeros((k, k)),) * 2)]
     growing = [certificate for certificate, _ in proven.growing]
-    growing = growing or [Growing(0.5, 2.0, tuple(range(motions.limits)), (0,) * len(motions.touching))]
+    growing = growing or [Growing(0.5, 2.0, Behaviour(tuple(range(motions.limits)), (0,) * len(motions.touching)))]
     for _ in range(count):
         if rng.random() < 0.7:
             leaf = mutant_of_no_motion(rng, leaves[rng.integers(len(leaves))])
@@ -174,4 +177,4 @@ def test_nodes_that_may_stick():
     assert k == 1 or not leaf(k, weights)._admitted(motions)
     weights[0, 1:] = 0.0
     assert leaf(k, weights)._admitted(motions)
-    assert Growing(0.5, 2.0, (0,)).found(stiffness, motions) is None
+    assert Growing(0.5, 2.0, Behaviour((0,))).found(stiffness, motions) is None

@@ -4,11 +4,12 @@ from collections import Counter
 
 import numpy as np
 import pytest
-from growing_motions import growing_motions
-from linear_motions import random_motion, setting
+from growing_motions import growing_in_space, growing_motions
+from linear_motions import random_motion, random_motion_in_space, setting, setting_in_space
 
 from enumsol.search.stability import StabilitySearch
 from enumsol.trusted.running_away import everywhere
+from enumsol.trusted.status_rows import OPEN, STICK
 
 
 def verdict(proven):
@@ -17,13 +18,17 @@ def verdict(proven):
     return "undecided" if proven.gaps or not everywhere(proven.ranges) else "does not run away"
 
 
-def compared(seeds, **kind):
+def compared(seeds, *, in_space=False, **kind):
     """Counts of verdicts; none of them contradicts the judge, and rates are those that it finds."""
     counts = Counter()
     for seed in seeds:
-        data = random_motion(np.random.default_rng(seed), **kind)
-        judged = growing_motions(*data)
-        stiffness, motions = setting(*data)
+        rng = np.random.default_rng(seed)
+        if in_space:
+            data = random_motion_in_space(rng)
+            judged, (stiffness, motions) = growing_in_space(*data[:-1]), setting_in_space(*data)
+        else:
+            data = random_motion(rng, **kind)
+            judged, (stiffness, motions) = growing_motions(*data), setting(*data)
         proven = StabilitySearch(stiffness, motions).run()
         said = verdict(proven)
         counts[said] += 1
@@ -67,3 +72,35 @@ def test_two_thousand_random_motions(part):
 def test_three_hundred_with_touching_nodes(part):
     counts = compared([(5, part, k) for k in range(100)], touching=True)
     assert counts["undecided"] <= 2, counts
+
+
+@pytest.mark.parametrize(("press", "shear", "code"), [(-0.2, 0.1, STICK), (0.2, 0.1, OPEN), (-0.2, 0.4, None)])
+def test_a_node_that_touches_in_space_sticks_or_is_open(press, shear, code):
+    """The slip of one node, mu = F A_nt - A_tt = 0.35, presses on another one, or leaves it; slips are not proven."""
+    A = np.eye(6) * 2
+    A[1, 1], A[0, 1], A[1, 3], A[1, 4] = 1.0, 0.9, press, shear
+    A = np.triu(A) + np.triu(A, 1).T
+    rows, F = np.eye(6), np.array([[1.5, 1.5], [1.0, 2.0]])
+    W = np.stack([rows[[1, 4]], rows[[2, 5]]], axis=1) * F[:, :, None]
+    data = A, np.eye(6), rows[[0, 3]], W, ["limit", "touching"], np.array([[1.0, 0.0], [1.0, 0.0]])
+    growing = StabilitySearch(*setting_in_space(*data, F)).run().growing
+    judged = [mu for mu, *_ in growing_in_space(*data)]
+    assert judged
+    assert [own.way.touching for own, _ in growing] == ([(code,)] if code is not None else [])
+    if code is not None:
+        [(_, motion)] = growing
+        assert any(motion.mu[0] * (1 - 1e-6) <= mu <= motion.mu[1] * (1 + 1e-6) for mu in judged)
+        assert code == OPEN or motion.mu[0] == pytest.approx(0.35)
+
+
+@pytest.mark.slow
+def test_nodes_that_touch_in_space():
+    counts = compared([(6, k) for k in range(12)], in_space=True)
+    assert counts["does not run away"], counts
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("part", range(2))
+def test_two_hundred_with_a_node_that_touches_in_space(part):
+    counts = compared([(7, part, k) for k in range(100)], in_space=True)
+    assert counts["undecided"] <= 10, counts

@@ -46,8 +46,10 @@ def test_roots_of_something_else():
     other = gallery.get("one-node-6.2").build().replace(mass=np.eye(2))
     bad_argument("root solves another problem; expected one of enumerate_roots", enumsol.stability, other, roots[0])
     [family] = enumsol.enumerate_roots(gallery.get("one-node-6.3").build(), 2.0).families
-    bad_argument("expected a root of enumerate_roots, not a family", enumsol.stability, one, family)
-    bad_argument("expected a root of enumerate_roots, not a family", enumsol.stability, one, 3)
+    message = "root is a family of solutions; expected an isolated root of enumerate_roots"
+    bad_argument(message, enumsol.stability, one, family, mass=np.eye(2))
+    bad_argument(message, enumsol.rates, one, family, one.f)
+    bad_argument("root is 3; expected an isolated root of enumerate_roots", enumsol.stability, one, 3)
 
 
 def test_friction_that_depends_on_the_solution():
@@ -72,6 +74,17 @@ def test_rounding_of_an_assembly_is_forgiven():
     assert enumsol.stability(one, roots[1], mass=mass).verdict != "undecided"
     singular = np.array([[1.0, 1.0], [1.0, 1.0]])
     assert one.replace(mass=singular).mass.shape == (2, 2)
+
+
+def test_families_are_not_examined_and_that_is_said():
+    problem = gallery.get("one-node-6.3").build()
+    found = enumsol.enumerate_roots(problem, 2.0)
+    line = "families of solutions are not examined for stability"
+    assert line not in repr(found)
+    assert found.stability(mass=np.eye(problem.n)) == ()
+    assert line in repr(found)
+    assert line in found._repr_html_()
+    bad_argument("there is no isolated root; expected one", found.stability_proof, mass=np.eye(problem.n))
 
 
 def test_no_roots_have_no_verdicts():

@@ -56,6 +56,7 @@ LONG = (
     "branching_rule",
     "certification_cost",
     "condensation_cost",
+    "contact_alone",
     "continuation_coverage",
     "continuation_steps",
     "extremes",

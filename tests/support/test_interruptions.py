@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from complete import whole_graph
 from cut_short import false_claims_of_graph, false_claims_of_roots
+from effort import some
 from interruptions import AtLine
 from problems3d import SLIDING
 
@@ -69,7 +70,7 @@ def test_roots_that_were_found_are_kept_wherever_the_search_is_ended(name):
 )
 def test_arcs_that_were_found_are_kept_wherever_a_graph_is_ended(problem, interval, arithmetic):
     full = whole_graph(problem, interval)
-    kept = list(partials(lambda: enumsol.branch_graph(problem, interval, arithmetic), 8))
+    kept = list(partials(lambda: enumsol.branch_graph(problem, interval, arithmetic), some(4, of=8)))
     for partial in kept:
         assert partial.reasons
         assert list(false_claims_of_graph(partial, full)) == []
@@ -79,7 +80,7 @@ def test_arcs_that_were_found_are_kept_wherever_a_graph_is_ended(problem, interv
 @pytest.mark.slow
 def test_curves_that_were_found_are_kept_wherever_a_graph_in_3d_is_ended():
     full = whole_graph(SLIDING, (1.78, 1.82))
-    kept = list(partials(lambda: enumsol.branch_graph(SLIDING, (1.78, 1.82)), 8))
+    kept = list(partials(lambda: enumsol.branch_graph(SLIDING, (1.78, 1.82)), some(4, of=8)))
     for partial in kept:
         assert not partial.complete
         assert all(partial.at_least(alpha) <= full.multiplicity_at(alpha) for alpha in (1.785, 1.8, 1.81))
@@ -113,7 +114,7 @@ def test_a_path_that_was_interrupted_goes_on_from_its_last_point():
         return enumsol.follow(TRIANGLE, ROOTS[2], -1, (0, 10))
 
     full = call()
-    for partial in partials(call, 12):
+    for partial in partials(call, some(6, of=12)):
         assert len(partial.transitions) == sum(kind == "transition" for kind in partial.kinds)
         again = partial.resume()
         assert again.status == full.status

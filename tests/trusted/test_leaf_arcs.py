@@ -1,5 +1,6 @@
 """What is concluded of leaves in 3D over pieces of alpha: where their roots are, and whether these are one arc."""
 
+import functools
 from fractions import Fraction
 
 import numpy as np
@@ -56,12 +57,18 @@ def has(codes, root, problem):
     return True
 
 
+@functools.cache
+def vertices_of(p, seed):
+    """A problem, and the alphas of the vertices of its graph inside the interval."""
+    problem = random_over_alpha(p, seed)
+    graph = enumsol.branch_graph(problem, (0, 1), max_nodes=400)
+    return problem, [v.alpha for v in graph.vertices if 0.01 < float(v.alpha) < 0.99]
+
+
 def cases(p, seed, count):
     """Pieces near to vertices of a graph, and leaves with roots there or beside them."""
     rng = np.random.default_rng([p, seed])
-    problem = random_over_alpha(p, seed)
-    graph = enumsol.branch_graph(problem, (0, 1), max_nodes=400)
-    inner = [v.alpha for v in graph.vertices if 0.01 < float(v.alpha) < 0.99]
+    problem, inner = vertices_of(p, seed)
     for _ in range(count):
         about = (
             Fraction(float(rng.choice(inner)))
@@ -78,6 +85,7 @@ def cases(p, seed, count):
             yield problem, piece_of(problem, low, high), leaf_of(root, problem, int(rng.integers(3, 12)), rng)
 
 
+@pytest.mark.few(3, 0)
 @pytest.mark.parametrize(("p", "seed"), NEAR)
 def test_a_piece_is_narrowed_to_all_alpha_of_a_leafs_roots(p, seed):
     """Roots at single alphas of the piece are in the part that is left."""
@@ -85,8 +93,8 @@ def test_a_piece_is_narrowed_to_all_alpha_of_a_leafs_roots(p, seed):
     for problem, piece, codes in cases(p, seed, 8):
         narrowed, found = piece.narrowed(codes)
         narrower += found is None or narrowed.high - narrowed.low < piece.high - piece.low
-        for k in range(17):
-            alpha = piece.low + (piece.high - piece.low) * k / 16
+        for k in range(9):
+            alpha = piece.low + (piece.high - piece.low) * k / 8
             if any(has(codes, root, problem) for root in enumsol.enumerate_roots(problem, alpha)):
                 assert found is not None
                 assert narrowed.low <= alpha <= narrowed.high
@@ -104,10 +112,11 @@ def is_on(chain, given, root):
     return False
 
 
+@pytest.mark.few(3, 0)
 @pytest.mark.parametrize(("p", "seed"), NEAR)
 def test_roots_on_an_arc_are_on_one_curve(p, seed):
-    """The curve through one root of an arc, which is proven in another way, goes through all others."""
-    arcs = 0
+    """A curve through one root of an arc, which is proven in another way, goes through all others."""
+    arcs, chains = 0, []
     for problem, piece, codes in cases(p, seed, 8):
         arc = piece.arc(codes)
         if arc is None:
@@ -124,8 +133,11 @@ def test_roots_on_an_arc_are_on_one_curve(p, seed):
             continue
         arcs += 1
         given, first = AlphaProblem.of(problem.enclosure), on_it[len(on_it) // 2]
-        x = np.concatenate([first.lambda_n, *first.lambda_t.T, [float(first.alpha)]])
-        chain = chain_through(given, problem, x, (Fraction(0), Fraction(1)))
+        chain = next((known for known in chains if is_on(known, given, first)), None)
+        if chain is None:
+            x = np.concatenate([first.lambda_n, *first.lambda_t.T, [float(first.alpha)]])
+            chain = chain_through(given, problem, x, (Fraction(0), Fraction(1)))
+            chains.append(chain)
         assert all(is_on(chain, given, root) for root in on_it), codes
     assert arcs
 

@@ -1,5 +1,6 @@
 """Leaves in 3D where the equations of the statuses are singular, against the closed form of one node."""
 
+import functools
 from fractions import Fraction
 
 import numpy as np
@@ -52,9 +53,10 @@ def points_in(node, piece, number):
     return [(x, at) for x, at in found if at is not None]
 
 
+@functools.cache
 def cases(seed, load, sizes=((6, 0.05), (9, 0.02), (11, 0.02), (12, 0.004))):
     """Leaves around where the equations are singular, over pieces of several lengths, and their solutions."""
-    node = OneNode(seed, load)
+    node, found = OneNode(seed, load), []
     problem = node.problem
     for phi in singular(node):
         for level, length in sizes:
@@ -62,8 +64,11 @@ def cases(seed, load, sizes=((6, 0.05), (9, 0.02), (11, 0.02), (12, 0.004))):
             low, high = alpha - Fraction(length) / 3, alpha + Fraction(length)
             system = SpaceSolvers(problem, alpha, "verified").system
             piece = AlphaPiece(AlphaSpace(problem.enclosure, alpha, (system.force, system.length)), low, high)
-            for number in sectors_near(phi, level):
-                yield node, problem, piece, (SECTORS + number,), points_in(node, piece, number)
+            found += [
+                (node, problem, piece, (SECTORS + number,), points_in(node, piece, number))
+                for number in sectors_near(phi, level)
+            ]
+    return found
 
 
 @pytest.mark.parametrize(("seed", "load"), SINGULAR)

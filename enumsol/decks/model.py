@@ -1,0 +1,339 @@
+"""A deck as a plain description: arrays and small records, which know nothing of contact problems.
+
+While it is read, nodes, elements, sets and surfaces belong to a `DeckRegion`: the deck itself, a part, or an instance
+of a part. `enumsol.decks.assembly` puts them together to what `Deck` holds in the end: one list of nodes and one of
+elements for everything, and sets and surfaces by the rows in these.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+from pathlib import Path
+
+import numpy as np
+
+from enumsol.decks.cards import DeckPlace, is_number, key
+from enumsol.decks.elements import ElementType
+from enumsol.decks.steps import Analysis
+from enumsol.errors import InvalidArgumentError
+from enumsol.support.array_types import Floats, Integers
+from enumsol.support.messages import listed
+
+
+@dataclass(frozen=True)
+class Account:
+    """An entry of the account: a card, and what became of it.
+
+    Attributes
+    ----------
+    place : DeckPlace
+    card : str
+        Its name.
+    became : str
+        In words: "9 nodes", or "not used: the analysis is static".
+    used : bool
+        Whether it is part of the description.
+    """
+
+    place: DeckPlace
+    card: str
+    became: str
+    used: bool = True
+
+
+@dataclass(frozen=True, eq=False)
+class ElementBlock:
+    """Elements of one type, as a card *ELEMENT has them.
+
+    Attributes
+    ----------
+    type : ElementType
+    labels : (m,) int array
+        Numbers of the elements in the deck.
+    nodes : (m, k) int array
+        Their nodes in the deck's order: numbers while a region is read, rows of ``Deck.points`` in a deck.
+    place : DeckPlace
+    """
+
+    type: ElementType
+    labels: Integers
+    nodes: Integers
+    place: DeckPlace
+
+
+@dataclass(eq=False)
+class Members:
+    """A set or a surface while a region is read: what it is made of.
+
+    Attributes
+    ----------
+    place : DeckPlace
+        Where it begins.
+    spelled : str
+        Its name as it is written there.
+    parts : list of (kind, what, instance, place)
+        ``what`` is an array of numbers, a range of numbers, or the name of another set. ``kind`` is "NSET" or "ELSET",
+        in surfaces the label of a face ("S1"; "" for faces that belong to no other element).
+    nodal : bool
+        Whether it is a surface of nodes.
+    """
+
+    place: DeckPlace
+    spelled: str
+    parts: list[tuple[str, Integers | range | str, str, DeckPlace]] = field(default_factory=list)
+    nodal: bool = False
+
+
+@dataclass(frozen=True)
+class Section:
+    """A *SOLID SECTION, or another section: which elements are of which material.
+
+    Attributes
+    ----------
+    kind : str
+        Name of the card.
+    elements, material : str
+        Keys of the set of elements and of the material.
+    thickness : float or None
+        Of plane elements; None if the deck gives none.
+    orientation : str
+        Key of the orientation, or "".
+    place : DeckPlace
+    """
+
+    kind: str
+    elements: str
+    material: str
+    thickness: float | None
+    orientation: str
+    place: DeckPlace
+
+
+@dataclass(frozen=True, eq=False)
+class Orientation:
+    """Local directions of a material or of a section.
+
+    Attributes
+    ----------
+    system : str
+        "RECTANGULAR" or "CYLINDRICAL".
+    points : (2, 3) array
+        Points a on the first axis and b in the plane of the first two; of a cylindrical system two points on its axis.
+    origin : (3,) array
+    rotation : (int, float) or None
+        A local axis, 1 to 3, and degrees of an additional rotation about it.
+    place : DeckPlace
+    """
+
+    system: str
+    points: Floats
+    origin: Floats
+    rotation: tuple[int, float] | None
+    place: DeckPlace
+
+
+@dataclass(eq=False)
+class Material:
+    """A material as the deck gives it; None for what it does not give.
+
+    Attributes
+    ----------
+    name : str
+    place : DeckPlace
+    elastic : str
+        "ISO", "ORTHO" (nine moduli D1111, D1122, D2222, D1133, D2233, D3333, D1212, D1313, D2323) or
+        "ENGINEERING CONSTANTS" (E1, E2, E3, nu12, nu13, nu23, G12, G13, G23); "" if it has none.
+    constants : (k,) array
+        Of the elastic law: (E, nu) of an isotropic one.
+    density : float or None
+    expansion : (k,) array or None
+        Coefficients of thermal expansion: one, or three along the local directions.
+    zero : float
+        Temperature from which expansion is measured.
+    elastic_place, expansion_place : DeckPlace or None
+    """
+
+    name: str
+    place: DeckPlace
+    elastic: str = ""
+    constants: Floats = field(default_factory=lambda: np.zeros(0))
+    density: float | None = None
+    expansion: Floats | None = None
+    zero: float = 0.0
+    elastic_place: DeckPlace | None = None
+    expansion_place: DeckPlace | None = None
+
+
+@dataclass(eq=False)
+class DeckRegion:
+    """Nodes, elements, sets and surfaces with numbers and names of their own: of the deck itself, or of a part.
+
+    Attributes
+    ----------
+    place : DeckPlace or None
+    spelled : str
+        Name of the part or the instance as it is written.
+    nodes : list of (DeckPlace, labels, points)
+    blocks : list of ElementBlock
+    sets : dict of ("NSET", "ELSET" or "SURFACE", key) to Members
+    sections : list of Section
+    orientations : dict of keys to Orientation
+    translation : (3,) array
+    rotation : (7,) array or None
+        Two points on an axis, and degrees about it, for after the translation.
+    is_used : bool
+        Whether there is an instance of the part.
+    """
+
+    place: DeckPlace | None = None
+    spelled: str = ""
+    nodes: list[tuple[DeckPlace, Integers, Floats]] = field(default_factory=list)
+    blocks: list[ElementBlock] = field(default_factory=list)
+    sets: dict[tuple[str, str], Members] = field(default_factory=dict)
+    sections: list[Section] = field(default_factory=list)
+    orientations: dict[str, Orientation] = field(default_factory=dict)
+    translation: Floats = field(default_factory=lambda: np.zeros(3))
+    rotation: Floats | None = None
+    is_used: bool = False
+
+    def members(self, kind: str, spelled: str, place: DeckPlace) -> Members:
+        """Members of a set or surface, which begins here if its name is new."""
+        return self.sets.setdefault((kind, key(spelled)), Members(place, spelled.strip('"')))
+
+    def copied(self, place: DeckPlace, spelled: str) -> DeckRegion:
+        """Copy for an instance, which may get more."""
+        sets = {name: replace(own, parts=[*own.parts]) for name, own in self.sets.items()}
+        return DeckRegion(place, spelled, [*self.nodes], [*self.blocks], sets, [*self.sections], dict(self.orientations)
+        )  # fmt: skip
+
+    def moved(self, points: Floats) -> Floats:
+        """Points (k, 3) of the part where its instance has them."""
+        at = points + self.translation
+        if self.rotation is None:
+            return at
+        origin, end, angle = self.rotation[:3], self.rotation[3:6], np.radians(self.rotation[6])
+        axis = (end - origin) / np.linalg.norm(end - origin)
+        arms = at - origin
+        along = np.outer(arms @ axis, axis)
+        return np.asarray(
+            origin + along + np.cos(angle) * (arms - along) + np.sin(angle) * np.cross(axis, arms)
+        )  # fmt: skip
+
+
+@dataclass(frozen=True, eq=False)
+class Surface:
+    """A surface.
+
+    Attributes
+    ----------
+    place : DeckPlace
+    faces : (k, 2) int array
+        Rows of elements, and numbers of their faces from 0; -1 for the element itself, of lower dimension than bodies.
+    nodes : (k,) int array or None
+        Rows of its nodes, of a surface of nodes.
+    """
+
+    place: DeckPlace
+    faces: Integers
+    nodes: Integers | None = None
+
+
+@dataclass(eq=False)
+class Deck:
+    """A deck: everything that its cards say, by keys in upper case ("SET", or "INSTANCE.SET" of an instance).
+
+    Attributes
+    ----------
+    path : Path
+    heading : str
+    points : (N, 3) array
+        Positions of all nodes [length].
+    node_labels : (N,) int array
+        Their numbers in the deck.
+    blocks : list of ElementBlock
+        Elements; their rows are counted through all blocks.
+    node_sets, element_sets : dict of keys to int arrays
+        Rows of nodes, and of elements.
+    surfaces : dict of keys to Surface
+    spelled : dict
+        Names of sets and surfaces as they are written, by their keys.
+    materials : dict of keys to Material
+    sections : list of Section
+    orientations : dict of keys to Orientation
+    instances : dict of keys ("" for the deck itself) to (first row of nodes, behind the last, first row of elements,
+        behind the last)
+    analysis : Analysis
+        Steps, contacts and constraints.
+    account : list of Account
+    """
+
+    path: Path
+    heading: str = ""
+    points: Floats = field(default_factory=lambda: np.zeros((0, 3)))
+    node_labels: Integers = field(default_factory=lambda: np.zeros(0, dtype=np.int64))
+    blocks: list[ElementBlock] = field(default_factory=list)
+    node_sets: dict[str, Integers] = field(default_factory=dict)
+    element_sets: dict[str, Integers] = field(default_factory=dict)
+    surfaces: dict[str, Surface] = field(default_factory=dict)
+    spelled: dict[str, str] = field(default_factory=dict)
+    materials: dict[str, Material] = field(default_factory=dict)
+    sections: list[Section] = field(default_factory=list)
+    orientations: dict[str, Orientation] = field(default_factory=dict)
+    instances: dict[str, tuple[int, int, int, int]] = field(default_factory=dict)
+    analysis: Analysis = field(default_factory=Analysis)
+    account: list[Account] = field(default_factory=list)
+
+    @cached_property
+    def element_labels(self) -> Integers:
+        """Numbers (M,) of all elements in the deck."""
+        return np.concatenate([np.zeros(0, dtype=np.int64), *(block.labels for block in self.blocks)])
+
+    def nodes_of(self, name: str, place: DeckPlace) -> Integers:
+        """Rows of the nodes that a card names: a number, a set, or either of an instance ("L-1.3", "L-1.FLOOR").
+
+        Raises
+        ------
+        InvalidArgumentError
+            There are none.
+        """
+        return self._rows(name, place, "node", self.node_sets, self.node_labels, 0)
+
+    def elements_of(self, name: str, place: DeckPlace) -> Integers:
+        """Rows of the elements that a card names, as `nodes_of` those of nodes.
+
+        Raises
+        ------
+        InvalidArgumentError
+            There are none.
+        """
+        return self._rows(name, place, "element", self.element_sets, self.element_labels, 2)
+
+    def node_name(self, row: int) -> str:
+        """Number of a node in the deck, behind the name of its instance if it has one."""
+        return self._name(row, self.node_labels, 0)
+
+    def element_name(self, row: int) -> str:
+        """Number of an element in the deck, behind the name of its instance if it has one."""
+        return self._name(row, self.element_labels, 2)
+
+    def _rows(
+        self, name: str, place: DeckPlace, what: str, sets: dict[str, Integers], labels: Integers, column: int
+    ) -> Integers:
+        instance, _, number = name.strip().rpartition(".")
+        if is_number(number) and key(instance) in self.instances:
+            first, last = self.instances[key(instance)][column : column + 2]
+            rows = first + np.flatnonzero(labels[first:last] == int(number))
+        else:
+            rows = sets.get(key(name), np.zeros(0, dtype=np.int64))
+        if not len(rows):
+            known = listed(sets) or "none"
+            found = "is empty or not" if key(name) in sets else "is not"
+            raise InvalidArgumentError(
+                f"{place}: {what} {name} {found} in the deck; expected a number or a set of {known}"
+            )
+        return rows
+
+    def _name(self, row: int, labels: Integers, column: int) -> str:
+        instance = next((name for name, ends in self.instances.items() if ends[column] <= row < ends[column + 1]), "")
+        return f"{instance}.{labels[row]}" if instance else str(labels[row])

@@ -1,0 +1,179 @@
+"""Meshes of decks: what a deck describes as cells of a body and named parts, in the way files of meshio give them."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from enumsol.decks.faces import face_nodes, uncollapsed
+from enumsol.errors import InvalidArgumentError
+from enumsol.support.messages import counted
+
+if TYPE_CHECKING:
+    from enumsol.decks.model import Deck, ElementBlock
+    from enumsol.support.array_types import Floats, Integers, Mask
+
+#: Sections whose elements carry something.
+_CARRYING = ("SOLID SECTION", "SHELL SECTION", "MEMBRANE SECTION", "BEAM SECTION")
+#: Elements without a section that are left out wherever they lie: lines of meshes, and what has cards of its own.
+_LEFT_OUT = ("trusses", "beams", "springs", "dashpots", "gap elements", "couplings", "point masses")
+#: What meshio writes at the top of its decks, in which a type of elements stands for nothing but a shape.
+_WRITTEN_BY_SHAPE = "written by meshio"
+
+
+@dataclass(frozen=True, eq=False)
+class CellBlock:
+    """Cells of one kind: its name as meshio has it, nodes (m, k) in the order of VTK, and numbers in the deck."""
+
+    type: str
+    data: Integers
+    labels: Integers
+
+
+@dataclass(eq=False)
+class DeckMesh:
+    """A deck as a mesh, with what a meshio.Mesh has, and the types and numbers of its elements.
+
+    Attributes
+    ----------
+    points : (N, 3) array
+    cells : list of CellBlock
+        Cells of bodies, and facets of surfaces and of elements that only carry the name of a set.
+    point_sets : dict of names to rows of points
+    cell_sets : dict of names to lists of rows of cells, by blocks
+    types : list of str
+        Of the elements of bodies.
+    """
+
+    points: Floats
+    cells: list[CellBlock] = field(default_factory=list)
+    point_sets: dict[str, Integers] = field(default_factory=dict)
+    cell_sets: dict[str, list[Integers]] = field(default_factory=dict)
+    types: list[str] = field(default_factory=list)
+    point_data: dict[str, Any] = field(default_factory=dict)
+    cell_data: dict[str, Any] = field(default_factory=dict)
+    field_data: dict[str, Any] = field(default_factory=dict)
+
+    def add(self, kind: str, data: Integers, labels: Integers, names: dict[str, Integers]) -> None:
+        """Add a block of cells, and which of its rows belong to which sets."""
+        self.cells.append(CellBlock(kind, data, labels))
+        for name, rows in names.items():
+            own = self.cell_sets.setdefault(name, [])
+            own += [np.zeros(0, dtype=np.int64)] * (len(self.cells) - 1 - len(own))
+            own.append(rows)
+
+    def labels(self, kinds: list[str]) -> Integers:
+        """Numbers of all cells of some kinds."""
+        return np.concatenate([block.labels for block in self.cells if block.type in kinds])
+
+    def closed(self) -> DeckMesh:
+        """Finished mesh, with all sets as long as the list of blocks."""
+        for own in self.cell_sets.values():
+            own.extend([np.zeros(0, dtype=np.int64)] * (len(self.cells) - len(own)))
+        return self
+
+
+def deck_mesh(deck: Deck, *, spelled: bool = False) -> DeckMesh:
+    """Cells and named parts of a deck.
+
+    Bodies are its solid elements, or its plane ones if there are no solid ones. Elements of one dimension less that
+    have no section and lie on bodies only carry the names of sets, as programs of meshes write them: they are facets.
+
+    Parameters
+    ----------
+    deck : Deck
+    spelled : bool
+        Take names as they are written, and not in upper case.
+
+    Raises
+    ------
+    InvalidArgumentError
+        There are no bodies, or elements of another kind that carry something, or of which something is lost.
+    """
+    bodies, shapes = _bodies(deck)
+    of = deck.spelled if spelled else {}
+    made = DeckMesh(deck.points, types=list(dict.fromkeys(deck.blocks[k].type.name for k in bodies if not shapes)))
+    dimension = deck.blocks[bodies[0]].type.shape.dimension
+    firsts = np.cumsum([0, *(len(block.labels) for block in deck.blocks)])
+    sets = {of.get(name, name): rows for name, rows in deck.element_sets.items()}
+    covered = np.zeros(len(deck.points), dtype=bool)
+    for k in bodies:
+        covered[deck.blocks[k].nodes] = True
+        _add(made, deck.blocks[k], int(firsts[k]), sets)
+    surfaces = {of.get(name, name): own for name, own in deck.surfaces.items()}
+    for k, block in enumerate(deck.blocks):
+        if k not in bodies:
+            _check_carrier(deck, block, int(firsts[k]), dimension, covered)
+            if block.type.shape.dimension == dimension - 1 and _carries_names(block, covered):
+                _add(made, block, int(firsts[k]), {name: rows for name, rows in sets.items() if name not in surfaces})
+    made.point_sets = {of.get(name, name): rows for name, rows in deck.node_sets.items()}
+    for name, surface in surfaces.items():
+        if surface.nodes is not None:
+            if not np.array_equal(made.point_sets.setdefault(name, surface.nodes), surface.nodes):
+                raise InvalidArgumentError(
+                    f"{surface.place}: the surface {name} has other nodes than the set {name}; expected "
+                    "names that differ"
+                )
+            continue
+        for shape, nodes in face_nodes(deck, surface.faces):
+            made.add(shape.name, nodes, np.zeros(len(nodes), dtype=np.int64), {name: np.arange(len(nodes))})
+    return made.closed()
+
+
+def _bodies(deck: Deck) -> tuple[list[int], bool]:
+    """Blocks of the bodies, and whether their types stand for shapes alone."""
+    shapes = _WRITTEN_BY_SHAPE in deck.heading
+    own = [k for k, block in enumerate(deck.blocks) if block.type.is_body or shapes]
+    dimension = max((deck.blocks[k].type.shape.dimension for k in own), default=0)
+    bodies = [k for k in own if deck.blocks[k].type.shape.dimension == dimension]
+    if dimension < 2:
+        other = next((block for block in deck.blocks if block.type.shape.dimension), None)
+        found = "the deck has no elements of bodies"
+        if other is not None:
+            found = f"{other.place}: the cells of the body are elements of type {other.type.name}, which are "
+            found += other.type.family
+        raise InvalidArgumentError(
+            f"{found}; expected solid ones (C3D8, C3D4 and the like), or plane ones (CPS4, CPE8, CAX6 and the like)"
+        )
+    return bodies, shapes
+
+
+def _add(made: DeckMesh, block: ElementBlock, first: int, sets: dict[str, Integers]) -> None:
+    """Add the elements of a block by their shapes, collapsed ones as what they are."""
+    for shape, rows, nodes in uncollapsed(block.type.shape, block.nodes):
+        data = nodes[:, shape.to_vtk] if shape.to_vtk else nodes
+        place = np.full(len(block.labels), -1)
+        place[rows] = np.arange(len(rows))
+        names = {}
+        for name, members in sets.items():
+            own = place[members[(members >= first) & (members < first + len(block.labels))] - first]
+            if np.any(own >= 0):
+                names[name] = own[own >= 0]
+        made.add(shape.name, data, block.labels[rows], names)
+
+
+def _carries_names(block: ElementBlock, covered: Mask) -> bool:
+    return bool(np.all(covered[block.nodes]))
+
+
+def _check_carrier(deck: Deck, block: ElementBlock, first: int, dimension: int, covered: Mask) -> None:
+    """Refuse elements that are no bodies and carry something, or lie elsewhere."""
+    kind = block.type
+    within = np.arange(first, first + len(block.labels))
+    for section in deck.sections:
+        own = deck.element_sets.get(section.elements)
+        if section.kind in _CARRYING and own is not None and np.any(np.isin(within, own)):
+            raise InvalidArgumentError(
+                f"{block.place}: elements of type {kind.name} are {kind.family} and carry something (*{section.kind}, "
+                f"line {section.place.line}); expected solid or plane elements only, or --ignore {kind.name} to do "
+                "without them"
+            )
+    lies_on_bodies = kind.shape.dimension < dimension and _carries_names(block, covered)
+    if not lies_on_bodies and (kind.shape.dimension >= 2 or kind.family not in _LEFT_OUT):
+        lost = counted(int(np.sum(~np.all(covered[block.nodes], axis=1))), "element")
+        raise InvalidArgumentError(
+            f"{block.place}: elements of type {kind.name} are {kind.family}, {lost} of which lie on no face of a solid "
+            f"element; expected solid or plane elements only, or --ignore {kind.name} to do without them"
+        )

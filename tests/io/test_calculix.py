@@ -1,0 +1,145 @@
+"""Results of CalculiX: files that it wrote are read, and what is written is read by a reader of its own."""
+
+import re
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import enumsol
+from enumsol import fem
+from enumsol.auditing.results import compare_result
+from tests.helpers.refusals import bad_argument
+
+HERE = Path(__file__).parent / "calculix"
+
+
+def columns(file, start):
+    """Rows of a data set by the documented columns: key (3), number (10), values (12 each)."""
+    rows, inside = {}, False
+    for line in file.read_text().splitlines():
+        if line.startswith(start):
+            inside = True
+        elif inside and line.startswith(" -3"):
+            return rows
+        elif inside and line.startswith(" -1"):
+            rows[int(line[3:13])] = [float(line[k : k + 12]) for k in range(13, len(line), 12)]
+    return rows
+
+
+def three_roots():
+    entry = enumsol.gallery.get("wedge-8-3")
+    problem = entry.build()
+    return problem, enumsol.enumerate_roots(problem, entry.alpha)
+
+
+def test_files_of_calculix_are_read_by_both_readers():
+    frd, dat = enumsol.read_results(HERE / "column.frd")[-1], enumsol.read_results(HERE / "column.dat")[-1]
+    assert frd.numbers.tolist() == dat.numbers.tolist() == [*range(1, 21)]
+    assert frd.time == dat.time == 1.0
+    np.testing.assert_allclose(frd.displacements, dat.displacements, atol=2e-6)
+    assert frd.displacements[5].tolist() == [5.21656e-02, 9.79736e-03, -2.19499e-02]
+    assert frd.points[18].tolist() == [1, 1, 0.5]
+
+
+def test_nodes_and_displacements_are_written_as_calculix_does(tmp_path):
+    problem, found = three_roots()
+    file = tmp_path / "roots.frd"
+    enumsol.write_frd(problem, found, file)
+    mesh = problem.mesh
+    points = columns(file, "    2C")
+    assert sorted(points) == [*range(1, len(mesh.points) + 1)]
+    np.testing.assert_allclose([points[k + 1][:2] for k in range(len(mesh.points))], mesh.points, rtol=1e-5, atol=1e-9)
+    back = enumsol.read_results(file)
+    assert [result.time for result in back] == [1.0, 2.0, 3.0]
+    for root, result in zip(found, back, strict=True):
+        np.testing.assert_allclose(
+            result.on(mesh), mesh.displacements(root.u), atol=1e-5 * np.max(np.abs(mesh.displacements(root.u)))
+        )
+    # numbers end in the columns in which those of CalculiX's own file end
+    ours, theirs = file.read_text().splitlines(), (HERE / "column.frd").read_text().splitlines()
+    for start in ("    2C", "    3C", "  100C", " -4  DISP", " -5  D1", " -5  ALL"):
+        one, other = (next(line for line in lines if line.startswith(start)) for lines in (ours, theirs))
+        ends = [[match.end() for match in re.finditer(r"\S+", line)] for line in (one, other)]
+        assert ends[0] == ends[1], start
+
+
+def test_quadratic_hexahedra_have_the_order_of_cgx(tmp_path):
+    mesh = fem.read_mesh(HERE / "column.inp")
+    problem = fem.mesh_problem(mesh, young=1000, poisson=0.3, friction=0.3, contact="LOW", clamp="HIGH")
+    enumsol.write_frd(problem, enumsol.enumerate_roots(problem, 0), tmp_path / "column.frd")
+
+    def cells(file):
+        text = file.read_text().splitlines()
+        first = next(k for k, line in enumerate(text) if line.startswith("    3C"))
+        last = next(k for k in range(first, len(text)) if text[k].startswith(" -3"))
+        return [line.split() for line in text[first + 1 : last] if line.startswith(" -2")]
+
+    assert cells(tmp_path / "column.frd")[:2] == cells(HERE / "column.frd")[:2]
+
+
+@pytest.mark.parametrize("which", [0, 1, 2])
+def test_a_result_with_the_error_of_a_penalty_is_the_root_that_it_is(which):
+    problem, found = three_roots()
+    rng = np.random.default_rng(which)
+    moved = problem.mesh.displacements(found[which].u)
+    noisy = moved + 0.01 * np.max(np.abs(moved)) * rng.uniform(-1, 1, moved.shape)
+    noisy[:3] = np.nan
+    compared = compare_result(problem, found, noisy)
+    assert compared.found == ("root", which)
+    assert compared.missed == [("root", k) for k in range(3) if k != which]
+    assert f"the result is root {which}: it differs by" in str(compared)
+    assert "3 solutions, all that there are" in str(compared)
+
+
+def test_what_is_no_root_is_none():
+    problem, found = three_roots()
+    moved = [problem.mesh.displacements(root.u) for root in found]
+    assert compare_result(problem, found, 0.5 * (moved[0] + moved[1]), tolerance=0.9).found is None
+    compared = compare_result(problem, found, 3.0 * moved[2])
+    assert compared.found is None
+    assert "the result is taken for no solution (it is too far away): it differs from root 0 by 99 %" in str(compared)
+
+
+def test_a_point_of_a_continuum_is_found():
+    problem = enumsol.gallery.one_node_triangle(f=(1, -2))
+    found = enumsol.enumerate_roots(problem, alpha=2)
+    part = found.families[0].polytopes[0]
+    middle = part.vertices.mean(axis=0)
+    u = problem.condensed.displacement(2, middle.T.ravel())
+    compared = compare_result(problem, found, problem.mesh.displacements(u))
+    assert compared.found == ("family", 0)
+
+
+@pytest.mark.parametrize(
+    ("content", "message"),
+    [
+        ("    1C\n", "has no displacements"),
+        (f"    2C{2:30d}{2:38d}\n", "binary"),
+        (f"    2C{1:30d}{1:38d}\n -1         1 0.00000E+00\n", "ends within a block"),
+        (f"    2C{1:30d}{1:38d}\n -1         1 x.00000E+00 0.00000E+00\n -3\n", "is damaged"),
+    ],
+)
+def test_damaged_files_are_refused(tmp_path, content, message):
+    file = tmp_path / "bad.frd"
+    file.write_text(content)
+    with pytest.raises(enumsol.InvalidArgumentError, match=message):
+        enumsol.read_results(file)
+
+
+def test_wrong_names_and_meshes_are_refused(tmp_path):
+    bad_argument("is no result file", enumsol.read_results, tmp_path / "x.txt")
+    bad_argument("cannot be read", enumsol.read_results, tmp_path / "x.frd")
+    result = enumsol.read_results(HERE / "column.frd")[0]
+    elsewhere = replace(result, points=result.points + 5.0)
+    bad_argument("are not in the file", elsewhere.on, enumsol.gallery.get("block3d-4").build().mesh)
+    dat = enumsol.read_results(HERE / "column.dat")[0]
+    mesh = enumsol.gallery.clamped_block(2, 1).mesh
+    bad_argument("no positions of nodes", dat.on, mesh)
+    bad_argument("has no mesh", enumsol.write_frd, without_mesh(), [], tmp_path / "x.frd")
+    bad_argument("ends in .frd", enumsol.write_frd, enumsol.gallery.clamped_block(2, 1), [], tmp_path / "x.vtu")
+
+
+def without_mesh():
+    return enumsol.ContactProblem([[1, 0], [0, 1]], [[1, 0]], [[0, 1]], [1, 1])
