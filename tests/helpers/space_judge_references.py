@@ -91,7 +91,7 @@ class RootForm:
         self.costs(equations, lacking)
 
     def sole(self, turns):
-        """No other root at all, by theory, Theorems 14.13 and 14.14."""
+        """No other root at all, by theory, section 14.15."""
         system, y, w, m = self.system, self.root.y, self.root.w, self.system.m
         theta = [[turns[place - len(system.tau)] for place in places] for places in system.tau]
         need(all(length_of(own) <= 1 + _TINY for own in theta), "theta is too long")
@@ -119,7 +119,7 @@ class RootForm:
         self.costs_at_most(R, radius, (centre, inverse), theta)
 
     def costs_at_most(self, R, radius, ellipsoid, theta):
-        """(14.22) and (14.23)."""
+        """What theory, (14.22) and (14.23), ask for."""
         (centre, inverse), y, w, rows = ellipsoid, self.root.y, self.root.w, []
         for i, places in enumerate(self.system.tau):
             v = [w[place] for place in places]

@@ -580,7 +580,7 @@ class LeafReference(RootReference[Row]):
             return self.form.is_sole(cost, within.least, within.left, within.farthest)
 
     def _costs_of_changes(self, weights: SpaceWeights, within: Confinement) -> Floats | None:
-        """What changes of w cost at least, (m,), of a root without slip; None where that may be nothing."""
+        """Least costs of changes of w, (m,), of a root without slip; None where one may be nothing."""
         cost, system = np.zeros(len(self.system.g)), self.system
         for i, (code, places) in enumerate(zip(self.selection, system.tau, strict=True)):
             t = places[places >= 0]
