@@ -234,9 +234,10 @@ class BranchGraph(GraphData):
     def stability(self, *, mass: ArrayLike | sp.sparray | sp.spmatrix | None = None) -> tuple[tuple[Span, ...], ...]:
         """Which arcs run away: one tuple of ranges of alpha an arc, in their order (see `enumsol.stability`).
 
-        Where friction does not depend on alpha, an arc has one verdict. Sheets and grazing arcs are undecided. Printed
-        graphs, tables and figures show the verdicts from then on, for the last mass that was asked for. A call that is
-        cut short loses nothing: the next one goes on after the last arc that was done.
+        In 2D, where friction does not depend on alpha, an arc has one verdict; in 3D the directions of slip turn along
+        an arc. Sheets and grazing arcs are undecided. Printed graphs, tables, figures and files show the verdicts from
+        then on, for the last mass that was asked for. Those of a graph that was loaded are as its file says until they
+        are asked for. A call that is cut short loses nothing: the next one goes on after the last arc that was done.
 
         Parameters
         ----------
@@ -250,7 +251,7 @@ class BranchGraph(GraphData):
         Raises
         ------
         InvalidArgumentError
-            The graph is one in 3D, where ``roots_at(alpha).stability()`` serves; otherwise as `enumsol.stability`.
+            There is no mass.
         InvalidProblemError
             The mass cannot be used.
 
@@ -263,13 +264,18 @@ class BranchGraph(GraphData):
         """
         from enumsol.branches.stability import ArcStabilities  # sparse graphs and solvers come with it
 
-        if mass is not None or self.verdicts is None:
+        if mass is not None or self.verdicts is None or self.verdicts_read:
             asked = ArcStabilities(self.problem, mass)
             found = self._found.setdefault("verdicts", []) if mass is None else []
             for arc in self.arcs[len(found) :]:
-                found.append(asked.spans(arc))
+                found.append(asked.spans(arc, self.arcs))
             self._found["verdicts"] = found
         return self.verdicts or ()
+
+    def _told(self) -> dict[str, Any]:
+        """The verdicts in a summary."""
+        spans = [list(map(asdict, spans)) for spans in self.verdicts or ()]
+        return {"stability": spans, "stability_read": self.verdicts_read}
 
     def starting_point(self, branch: Branch) -> Root | None:
         """A regular root in the middle of the branch's longest arc; None when there is none at any float alpha."""
@@ -311,7 +317,8 @@ class BranchGraph(GraphData):
     def summary(self) -> dict[str, Any]:
         """Counts and answers as plain values, for JSON; what is not known is None.
 
-        Once `stability` was asked for, ``stability`` has its ranges of alpha, arc by arc.
+        Once `stability` was asked for, ``stability`` has its ranges of alpha, arc by arc, and ``stability_read`` tells
+        whether they are only those of a file.
         """
         uniqueness, steps = self.claims.uniqueness(), self._steps
         return {
@@ -339,6 +346,6 @@ class BranchGraph(GraphData):
                 "at": list(steps.at),
                 "between": list(steps.between),
             },
-            **({} if self.verdicts is None else {"stability": [list(map(asdict, spans)) for spans in self.verdicts]}),
+            **({} if self.verdicts is None else self._told()),
             "stats": asdict(self.stats),
         }

@@ -193,9 +193,16 @@ class GraphData(Immutable):
 
     @property
     def verdicts(self) -> tuple[tuple[Span, ...], ...] | None:
-        """Verdicts that `BranchGraph.stability` found last, or None where it was not asked, or cut short."""
+        """Verdicts that `BranchGraph.stability` found last, or those of a file; None if not asked for, or cut short."""
         found = self._found.get("verdicts")
-        return None if found is None or len(found) < len(self.arcs) else tuple(found)
+        if found is None or len(found) < len(self.arcs):
+            found = self._found.get("read")
+        return None if found is None else tuple(found)
+
+    @property
+    def verdicts_read(self) -> bool:
+        """True if ``verdicts`` are those of a file, which nothing has checked."""
+        return "read" in self._found and len(self._found.get("verdicts", [])) < len(self.arcs)
 
     def inside(self, alpha: AlphaLike) -> Fraction:
         """An alpha of the interval."""
@@ -276,12 +283,18 @@ def branch_stability(data: GraphData, branch: Branch) -> str:
     return "; ".join(f"{verdict} ({counted(count, 'arc')})" for verdict, count in sorted(kinds.items()))
 
 
+def about_stability(data: GraphData) -> str:
+    """The line that says what verdicts are, and whether they are proven."""
+    read = "stability: as the file of this graph says, which nothing has checked; graph.stability() finds it again"
+    return read if data.verdicts_read else ABOUT_STABILITY
+
+
 def graph_text(data: GraphData) -> str:
     """Counts, a line a branch, and whether the graph is complete."""
     lines = [*_heading(data), *(_branch_line(data, branch) for branch in data.branches[:_PRINTED_BRANCHES])]
     if len(data.branches) > _PRINTED_BRANCHES:
         lines.append(f"  ... {len(data.branches) - _PRINTED_BRANCHES} more branches")
-    lines += [f"  {ABOUT_STABILITY}"] if data.verdicts is not None else []
+    lines += [f"  {about_stability(data)}"] if data.verdicts is not None else []
     lines += _left_open(data)
     return "\n".join([*lines, data.closing_line])
 
@@ -303,7 +316,7 @@ def graph_html(data: GraphData) -> str:
     heads = ("branch", "shape", "arcs", "alpha from", "to", "folds at")
     table = html_table(heads if data.verdicts is None else (*heads, "stability"), rows) if rows else ""
     closing = [*([f"... {more} more branches"] if more > 0 else []), *_left_open(data), data.closing_line]
-    closing[:0] = [ABOUT_STABILITY] if data.verdicts is not None else []
+    closing[:0] = [about_stability(data)] if data.verdicts is not None else []
     return html_lines(_heading(data)) + table + html_lines(closing)
 
 

@@ -19,7 +19,7 @@ from enumsol.arithmetic.algebraic import CriticalAlpha, EnclosedAlpha
 from enumsol.branches.elements import Arc, ArcValues, Vertex, VertexKind
 from enumsol.branches.enclosed.following import TracedArcValues, TracedProblem
 from enumsol.branches.gluing import ExactArcValues
-from enumsol.branches.graph_data import GraphData, GraphStats
+from enumsol.branches.graph_data import VERDICTS, GraphData, GraphStats, about_stability, verdict_words
 from enumsol.condensation.enclosure import enclosure_of
 from enumsol.condensation.exact import ExactCondensed
 from enumsol.condensation.unloaded import vanishing_alpha
@@ -37,6 +37,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
     from pathlib import Path
 
+    from enumsol.branches.stability import Span
     from enumsol.model.problem3d import AnyProblem
     from enumsol.support.array_types import Codes, Floats
 
@@ -81,6 +82,7 @@ def save_graph(data: GraphData, file: str | Path) -> None:
         "stats": asdict(data.stats),
         "vertices": [_vertex_record(v) for v in data.vertices],
         "arcs": [_arc_record(arc, data.vertices) for arc in data.arcs],
+        **({} if data.verdicts is None else {"verdicts": [list(map(asdict, spans)) for spans in data.verdicts]}),
     }
     write_file(file_path(file, "file"), json.dumps(record), "file")
 
@@ -121,7 +123,27 @@ def _from_record(kind: type[_Graph], record: dict[str, Any], size: int) -> _Grap
     if "left_open" in record:
         left_open = tuple((Fraction(low), Fraction(high)) for low, high in record["left_open"])
     named = record["arithmetic"]
-    return kind(problem, exact, (first, last), named, vertices, arcs, reasons, stats, left_open=left_open)
+    graph = kind(problem, exact, (first, last), named, vertices, arcs, reasons, stats, left_open=left_open)
+    if "verdicts" in record:
+        graph._found["read"] = _verdicts(record["verdicts"], arcs)
+    return graph
+
+
+def _verdicts(record: list[Any], arcs: Sequence[Arc]) -> list[tuple[Span, ...]]:
+    """Verdicts as a file has them, from end to end of every arc."""
+    from enumsol.branches.stability import Span  # sparse graphs and solvers come with it
+
+    found = []
+    for arc, items in zip(arcs, record, strict=True):
+        spans = []
+        for item in items:
+            growth = None if item["growth"] is None else (float(item["growth"][0]), float(item["growth"][1]))
+            spans.append(Span(float(item["low"]), float(item["high"]), item["verdict"], growth))
+        places = [arc.lo, *(place for span in spans for place in (span.low, span.high)), arc.hi]
+        if not spans or places[::2] != places[1::2] or places != sorted(places):
+            raise ValueError(f"the verdicts of arc {arc.number}")
+        found.append(tuple(spans))
+    return found
 
 
 def _graph_kind(problem: AnyProblem, vertices: object) -> dict[str, Any]:
@@ -154,6 +176,7 @@ def _graph_kind(problem: AnyProblem, vertices: object) -> dict[str, Any]:
     return {
         **{"interval": pair, "left_open?": [pair], "arithmetic": {"verified", "exact", "fast"}, "reasons": [str]},
         **{"arcs_by?": {"exact", "balls"}, "condensed_exactly": bool, "vertices": [vertex], "arcs": [arc]},
+        "verdicts?": [[{"low": float, "high": float, "verdict": {*VERDICTS}, "growth": Maybe((float, float))}]],
         "stats": dict.fromkeys((f"{item.name}?" for item in fields(GraphStats)), is_number),
     }
 
@@ -405,7 +428,9 @@ def write_graphml(data: GraphData, file: str | Path) -> None:
 
     In 3D the tangential arrays have both components of a node after each other.
     """
-    plain = nx.MultiGraph(complete=data.complete, standing=data.claims.standing.value)
+    words = verdict_words(data)
+    told = {"stability": about_stability(data)} if words else {}
+    plain = nx.MultiGraph(complete=data.complete, standing=data.claims.standing.value, **told)
     for v in data.vertices:
         plain.add_node(
             v.number,
@@ -425,6 +450,7 @@ def write_graphml(data: GraphData, file: str | Path) -> None:
             index="" if arc.index is None else str(arc.index),
             dimension=arc.dimension,
             branch=data.branch_of[arc.number],
+            **({"stability": words[arc.number]} if words else {}),
         )
     text = BytesIO()
     nx.write_graphml(plain, text)

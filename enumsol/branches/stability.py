@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
+import heapq
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from enumsol.errors import InvalidArgumentError
-from enumsol.model.problem import ContactProblem
 from enumsol.roots.stability import Stabilities, rate_bounds
 from enumsol.search.growing_motions import GrowingMotions
 from enumsol.search.stability import Proven, StabilitySearch
@@ -17,18 +16,20 @@ from enumsol.trusted.motions_of_body import friction_over
 from enumsol.trusted.running_away import Growing, everywhere
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
+    from collections.abc import Sequence
 
     import scipy.sparse as sp
 
     from enumsol.branches.elements import Arc
+    from enumsol.branches.space.slip_directions import SlipDirections
     from enumsol.model.problem3d import AnyProblem
     from enumsol.roots.stability import Verdict
     from enumsol.support.array_types import ArrayLike
     from enumsol.trusted.motions_of_body import Setting
 
-#: Parts of an arc in which nothing is proven at once are halved so often, and those where a verdict changes once more.
-_HALVINGS = 6
+#: Parts of an arc that are tried, which decides how much time an arc costs along which nothing is proven; and how short
+#: they are at the end, relative to the arc, about an alpha at which the verdict changes.
+_PARTS, _SHORTEST = 160, 2.0**-12
 #: Growing motions of a range of alpha are looked for between such powers of two: K(mu) is enclosed at few mu then.
 _GRIDS = (1 / 32, 1 / 8, 1 / 2)
 
@@ -62,72 +63,66 @@ class Span:
 
 
 class ArcStabilities:
-    """Verdicts on arcs of one problem in 2D.
+    """Verdicts on arcs of one problem.
 
     Parameters
     ----------
-    problem : ContactProblem
+    problem : ContactProblem or ContactProblem3D
     mass : (n, n) array_like or sparse, or None
         In place of ``problem.inertia``.
 
     Raises
     ------
     InvalidArgumentError
-        The problem is one in 3D, or has no mass.
+        The problem has no mass.
     InvalidProblemError
         The mass cannot be used.
     """
 
     def __init__(self, problem: AnyProblem, mass: ArrayLike | sp.sparray | sp.spmatrix | None = None) -> None:
-        if not isinstance(problem, ContactProblem):
-            raise InvalidArgumentError(
-                "the graph is one in 3D, where directions of slip change along an arc; expected one in 2D, or "
-                "graph.roots_at(alpha).stability()"
-            )
         self._problem, self._asked = problem, Stabilities(problem, mass)
         self._constant = not np.any(problem.affine_friction[1])
         #: Proofs at some alphas of the arc, by the contact rows of the part that they are about.
         self._hints: dict[tuple[int, ...], list[Proven]] = {}
+        self._directions: SlipDirections | None = None
 
-    def spans(self, arc: Arc) -> tuple[Span, ...]:
-        """Verdicts along an arc, from its lower end to its upper one."""
+    def spans(self, arc: Arc, arcs: Sequence[Arc] = ()) -> tuple[Span, ...]:
+        """Verdicts along an arc, from its lower end to its upper one; ``arcs`` are all of its graph, for 3D."""
         look()
         if arc.grazing or arc.dimension:
             return (Span(arc.lo, arc.hi, "undecided"),)
         self._hints = {}
-        if self._constant:
+        if self._asked.body.tangents > 1:
+            from enumsol.branches.space.slip_directions import SlipDirections  # for graphs in 3D only
+
+            self._directions = SlipDirections(arc, arcs)
+        if self._constant and (self._directions is None or not self._directions.turning):
             found = self._piece(arc, arc.lo, arc.hi)
             return (found or Span(arc.lo, arc.hi, "undecided"),)
-        first = _joined(self._halved(arc, arc.lo, arc.hi, _HALVINGS))
-        return tuple(_joined(self._refined(arc, first)))
+        return tuple(_joined(self._divided(arc)))
 
-    def _refined(self, arc: Arc, spans: list[Span]) -> Iterator[Span]:
-        """The same, with the places where the verdict changes known more closely."""
-        for k, span in enumerate(spans):
-            beside = {other.verdict for other in (*spans[max(k - 1, 0) : k], *spans[k + 1 : k + 2])}
-            if span.verdict == "undecided" and len(beside) == 2:
-                yield from self._halved(arc, span.low, span.high, _HALVINGS)
+    def _divided(self, arc: Arc) -> list[Span]:
+        """Verdicts in parts of an arc, halved where nothing is proven, the longest first."""
+        left, found = [(-arc.length, arc.lo, arc.hi)], list[Span]()
+        for _ in range(_PARTS):
+            if not left:
+                break
+            look()
+            _, low, high = heapq.heappop(left)
+            known, middle = self._piece(arc, low, high), 0.5 * (low + high)
+            if known is None and high - low > _SHORTEST * arc.length and low < middle < high:
+                for ends in ((low, middle), (middle, high)):
+                    heapq.heappush(left, (ends[0] - ends[1], *ends))
             else:
-                yield span
-
-    def _halved(self, arc: Arc, low: float, high: float, halvings: int) -> Iterator[Span]:
-        """Verdicts in a part of an arc, halved as often as it takes."""
-        look()
-        found, middle = self._piece(arc, low, high), 0.5 * (low + high)
-        if found is not None:
-            yield found
-        elif not halvings or not low < middle < high:
-            yield Span(low, high, "undecided")
-        else:
-            yield from self._halved(arc, low, middle, halvings - 1)
-            yield from self._halved(arc, middle, high, halvings - 1)
+                found.append(known or Span(low, high, "undecided"))
+        return sorted((*found, *(Span(low, high, "undecided") for _, low, high in left)), key=lambda span: span.low)
 
     def _piece(self, arc: Arc, low: float, high: float) -> Span | None:
         """The verdict in a part of an arc, if it is one that can be proven there at once."""
-        active = [frozenset({status}) for status in arc.statuses]
-        whole = list(self._asked.settings_of(active, friction_over(self._problem, low, high)))
         middle = 0.5 * (low + high)
-        at = list(self._asked.settings_of(active, friction_over(self._problem, middle, middle)))
+        whole, at = self._settings(arc, low, high), self._settings(arc, middle, middle)
+        if whole is None or at is None:
+            return None
         quiet = True
         for k, setting in enumerate(whole):
             verdict = self._verdict(setting, at[k])
@@ -135,6 +130,17 @@ class ArcStabilities:
                 return Span(low, high, "runs away", verdict)
             quiet = quiet and verdict
         return Span(low, high, "does not run away") if quiet else None
+
+    def _settings(self, arc: Arc, low: float, high: float) -> list[Setting] | None:
+        """Parts of the body for all alpha of a range, or, in floats in 3D, at one; None where they are not enclosed."""
+        active = [frozenset({status}) for status in arc.statuses]
+        known = self._directions
+        directions = None
+        if known is not None:
+            directions = known.at(low) if low == high else known.over(low, high)
+            if directions is None:
+                return None
+        return list(self._asked.settings_of(active, friction_over(self._problem, low, high), directions))
 
     def _verdict(self, setting: Setting, at: Setting) -> bool | tuple[float, float]:
         """Bounds of a growth rate in a range of alpha, or whether nothing grows; ``at`` is the same at its middle."""
@@ -172,7 +178,7 @@ def _extended(proven: Proven, setting: Setting) -> bool | tuple[float, float]:
     return all(leaf.holds(stiffness, motions) for _, _, leaves in proven.ranges for leaf in leaves)
 
 
-def _joined(spans: Iterator[Span]) -> list[Span]:
+def _joined(spans: Sequence[Span]) -> list[Span]:
     """Neighbours with the same verdict as one."""
     joined: list[Span] = []
     for span in spans:

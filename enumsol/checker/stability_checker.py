@@ -32,7 +32,7 @@ from enumsol.proof.stability_records import (
     root_from,
 )
 from enumsol.support.messages import counted
-from enumsol.trusted.motions_of_body import BodyMotions, friction_over
+from enumsol.trusted.motions_of_body import BodyMotions, friction_directions, friction_over
 from enumsol.trusted.running_away import Growing, NoMotion, covers
 from enumsol.trusted.status_rows import OPEN, STICK
 
@@ -212,7 +212,8 @@ class StabilityChecker(ProofChecker):
                 self.fail(f"root {said.number} is said to be undecided and has certificates")
             return UNDECIDED, None
         codes, forces = root.known
-        parts = list(self.body.settings([{code} for code in codes], self.F, forces))
+        directions = None if forces is None else friction_directions(forces, self.F)
+        parts = list(self.body.settings([{code} for code in codes], self.F, directions))
         given: list[list[Growing | NoMotion]] = [[] for _ in parts]
         try:
             for record in said.certificates:

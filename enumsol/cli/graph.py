@@ -63,8 +63,8 @@ def graph(
     ----------
     arithmetic : verified: rigorous error bounds, with proof. fast: the search trusts floats, never proven. exact:
         rationals throughout, with proof, slow beyond ten contact nodes.
-    stability : Say which arcs run away, however long it takes; by default in 2D, where PROBLEM has a mesh or a mass, if
-        that takes less than a tenth of the time of the graph.
+    stability : Say which arcs run away, however long it takes; by default where PROBLEM has a mesh or a mass, if that
+        takes less than a tenth of the time of the graph.
     save_file : Write the graph, for enumsol audit and follow.
     csv_file : Write a table with one row per arc; - is stdout.
     proof_file : Write the proof (verified), for enumsol verify.
@@ -224,9 +224,7 @@ def _told(
 
 def _has_mass(problem: AnyProblem) -> bool:
     """True if verdicts on arcs can be found without more data."""
-    from enumsol.model.problem import ContactProblem  # numpy: not for --help
-
-    return isinstance(problem, ContactProblem) and (problem.mass is not None or problem.mesh is not None)
+    return problem.mass is not None or problem.mesh is not None
 
 
 def read_graph(file: str, problem: AnyProblem) -> BranchGraph:

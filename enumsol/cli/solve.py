@@ -7,7 +7,8 @@ from typing import TYPE_CHECKING, Annotated, Any, NamedTuple
 
 import typer
 
-from enumsol.cli.common import GALLERY, TOML, note, parse_alpha, refuse_misspelt, units_of
+from enumsol.cli.common import GALLERY, TOML, note, parse_alpha, refuse_misspelt, scene_of, units_of
+from enumsol.cli.decks import is_deck
 from enumsol.cli.options import LIMITS, OUTPUT, Argument, OutputFile, OutputFlag, Quiet, options_of, with_options
 from enumsol.cli.output import deliver, write_figure
 from enumsol.cli.progress import Display
@@ -210,7 +211,8 @@ def solve(
     """Build a contact problem from MESH and find all its solutions.
 
     A .toml file holds the same options under the same names (`load_slope`, not `--load-slope`), and `mesh`. All other
-    commands accept such files as PROBLEM, and also the files that --output writes. Without --alpha, a problem that
+    commands accept such files as PROBLEM, and also the files that --output writes. So they do decks of CalculiX and
+    Abaqus with materials, contact and steps (.inp), which need no options here either. Without --alpha, a problem that
     depends on alpha is written but not solved. With --dry-run, what was understood is printed.
 
     Exit status: as enumsol roots.
@@ -294,12 +296,12 @@ def solve(
         if output is not None:
             return
         raise InvalidArgumentError("--alpha is missing, on which friction or load depend; expected it, or --output")
-    source = output if output is not None else mesh if mesh.endswith(TOML) else None
+    source = output if output is not None else mesh if mesh.endswith(TOML) or (is_deck(mesh) and not given) else None
     search.answer(mesh, problem, value or 0.0, source, scene)
 
 
 def _scene(mesh: str, options: dict[str, Any]) -> Scene:
-    """Scene that the mesh and the options, or a TOML file, describe."""
+    """Scene that the mesh and the options, or a TOML file or a deck, describe."""
     from enumsol import fem  # numpy: not for --help
     from enumsol.fem.conditions import refuse_old_friction
     from enumsol.fem.mesh_problems import check_keys
@@ -312,7 +314,9 @@ def _scene(mesh: str, options: dict[str, Any]) -> Scene:
             flag = _flags(next(iter(options)))[0]
             raise InvalidArgumentError(f"{flag} is given beside {mesh}, which has all options; expected it there")
         refuse_misspelt(mesh)
-        return fem.read_mesh_scene(mesh)
+    whole = scene_of(mesh) if mesh.endswith(TOML) or (is_deck(mesh) and not options) else None
+    if whole is not None:
+        return whole
     place = file_path(mesh, "MESH", "the name of a mesh file")
     if place.suffix in SUFFIXES or mesh.startswith(GALLERY):
         raise InvalidArgumentError(f"{mesh} is a problem; expected a mesh (enumsol roots {mesh} solves a problem)")

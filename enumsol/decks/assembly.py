@@ -12,7 +12,7 @@ from enumsol.decks.model import Account, Deck, DeckRegion, Members, Surface
 from enumsol.decks.registry import Reading
 from enumsol.errors import InvalidArgumentError
 from enumsol.support.array_types import Floats, Integers, Mask
-from enumsol.support.messages import counted
+from enumsol.support.messages import counted, listed
 
 _NONE = np.zeros(0, dtype=np.int64)
 
@@ -26,20 +26,26 @@ def put_together(reading: Reading) -> Deck:
         A number is given twice, a node or a set is not given, a set contains itself, or a face is none.
     """
     deck = reading.deck
+    if open_ := reading.part or reading.instance:
+        what = "PART" if reading.part else "INSTANCE"
+        raise InvalidArgumentError(f"{reading.region.place}: {open_} does not end; expected *END {what}")
+    for part in reading.parts.values():
+        if not part.is_used and part.place is not None:
+            said = f"part {part.spelled} not used: there is no *INSTANCE of it"
+            deck.account.append(Account(part.place, "PART", said, used=False))
     whole = _Whole(deck)
     for instance, region in (("", reading.top), *reading.instances.items()):
         whole.add(instance, region)
     deck.points = np.concatenate([np.zeros((0, 3)), *whole.points])
     deck.node_labels = np.concatenate([_NONE, *whole.labels])
-    for (kind, name), (members, _) in whole.sets.items():
+    for (kind, name), (members, instance) in whole.sets.items():
         if kind == "SURFACE":
             deck.surfaces[name] = whole.surface(name, members)
         else:
             rows = np.unique(whole.rows(kind, name))
             (deck.node_sets if kind == "NSET" else deck.element_sets)[name] = rows
-        deck.spelled.setdefault(
-            name, members.spelled if "." not in name else name.rsplit(".", 1)[0] + "." + members.spelled
-        )
+        before = f"{reading.instances[instance].spelled}." if instance else ""
+        deck.spelled.setdefault(name, before + members.spelled)
     return deck
 
 
@@ -147,9 +153,10 @@ class _Whole:
         if len(rows) < wanted:
             words = "nodes" if of == "NSET" else "elements"
             lost = counted(wanted - len(rows), "number")
-            self.deck.account.append(
-                Account(place, kind, f"set {members.spelled}: {lost} not used: there are no such {words}", used=False)
-            )
+            if not isinstance(what, range | str):
+                lost = listed(what[~there].tolist())
+            said = f"set {members.spelled}: {lost} not used: there are no such {words}"
+            self.deck.account.append(Account(place, kind, said, used=False))
         return self._nodes(rows) if of != kind else rows
 
     def _named(self, kind: str, what: str, instance: str, place: DeckPlace, above: tuple[str, ...]) -> Integers:

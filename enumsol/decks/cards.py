@@ -90,7 +90,7 @@ class Card:
             The option is missing.
         """
         if not (named := self.name_of(option)):
-            raise self.refused(f"has no {option}; expected {option}=...")
+            raise self.refused(f"has no {option}; expected {option}=NAME")
         return named
 
     def entries(self, row: int) -> list[str]:
@@ -249,18 +249,16 @@ class _Source:
         starred = [k for k, line in enumerate(lines) if line.lstrip()[:1] == "*"]
         self._add_data(path, lines, 0, starred[0] if starred else len(lines))
         begin = 0
-        for count, (k, following) in enumerate(zip(starred, [*starred[1:], len(lines)], strict=True)):
+        for count, k in enumerate(starred):
             if count % 1_000 == 0:
                 look()
                 tell(f"lines of {path.name}", k, len(lines))
-            if k < begin:
-                continue  # a comment among options
             text = lines[k].strip()
-            begin = k + 1
-            if not text.startswith("**"):
-                text, begin = _whole(lines, text, begin)
+            if k >= begin and not text.startswith("**"):
+                text, begin = _whole(lines, text, k + 1)
                 self._begin(DeckPlace(path.name, k + 1), path, text, above)
-            self._add_data(path, lines, begin, following)
+            begin = max(begin, k + 1)
+            self._add_data(path, lines, begin, starred[count + 1] if count + 1 < len(starred) else len(lines))
 
     def _begin(self, place: DeckPlace, path: Path, text: str, above: tuple[Path, ...]) -> None:
         word, *pairs = text[1:].split(",")
@@ -270,16 +268,17 @@ class _Source:
             if name.strip():
                 options[" ".join(name.upper().split())] = value.strip()
         card = Card(" ".join(word.upper().split()), options, place)
-        if card.name == "INCLUDE":
-            self.read(self._included(card, path, above), above)
-        else:
+        if card.name != "INCLUDE":
             self.cards.append(card)
+        if card.name == "INCLUDE" or options.get("INPUT"):  # cards of Abaqus may have their data in a file
+            self.read(self._included(card, path, above), above)
+            options.pop("INPUT")
 
     def _included(self, card: Card, path: Path, above: tuple[Path, ...]) -> Path:
         """File that a card includes."""
         name = card.options.get("INPUT", "").strip("\"'").replace("\\", "/")
         if not name:
-            raise card.refused("names no file; expected INPUT=...")
+            raise card.refused("names no file; expected INPUT=FILE")
         folder = self.path.parent.resolve()
         places = [(base / name).resolve() for base in (path.parent, self.path.parent)]
         place = next((each for each in places if each.exists()), places[0])

@@ -13,7 +13,7 @@ from enumsol.decks.registry import Reading, card, harmless
 from enumsol.support.messages import counted
 
 harmless("it asks for output", *(
-    "PREPRINT", "NODE PRINT", "EL PRINT", "NODE FILE", "EL FILE", "NODE OUTPUT", "ELEMENT OUTPUT", "OUTPUT",
+    "PREPRINT", "RESTART", "NODE PRINT", "EL PRINT", "NODE FILE", "EL FILE", "NODE OUTPUT", "ELEMENT OUTPUT", "OUTPUT",
     "CONTACT FILE", "CONTACT PRINT", "CONTACT OUTPUT", "FILE FORMAT", "MONITOR", "SECTION PRINT", "ENERGY FILE",
     "ENERGY PRINT", "ENERGY OUTPUT", "PRINT", "FILE OUTPUT", "INTEGRATED OUTPUT", "DIAGNOSTICS", "FACE PRINT",
 ))  # fmt: skip
@@ -37,9 +37,11 @@ def heading(reading: Reading, given: Card) -> str | None:
     return None
 
 
-@mesh_card("NODE", "NSET")
+@mesh_card("NODE", "NSET", "SYSTEM")
 def node(reading: Reading, given: Card) -> str:
     """*NODE: numbers and positions."""
+    if (system := given.name_of("SYSTEM") or "R") != "R":
+        raise given.refused(f"has positions in the system {system}; expected SYSTEM=R, rectangular ones")
     values = given.table(7)  # Abaqus: a direction behind the position
     labels = values[:, 0].astype(np.int64)
     if len(wrong := np.flatnonzero((labels != values[:, 0]) | (labels < 1) | (labels >= 2**53))):
@@ -106,6 +108,11 @@ def _set(reading: Reading, given: Card, kind: str) -> Members:
         return members
     every = [entry.strip() for text in given.data for entry in text.split(",")]
     numbers = [int(entry) for entry in every if is_number(entry) and len(entry) <= 18]
+    if any(is_number(entry) and len(entry) > 18 for entry in every):
+        for row, entries in given.rows():
+            for entry in entries:
+                if is_number(entry):
+                    given.integer(entry, row)  # says which one is too large
     if numbers:
         members.parts.append((kind, np.array(numbers, dtype=np.int64), instance, given.place))
     if len(numbers) < len(every):
@@ -125,21 +132,35 @@ def surface(reading: Reading, given: Card) -> str:
         raise given.refused(f"is of type {kind}, which is not read; expected TYPE=ELEMENT or TYPE=NODE")
     members = reading.region.members("SURFACE", given.options["NAME"], given.place)
     members.nodal = kind == "NODE"
+    numbers: dict[str, tuple[int, list[int]]] = {}
     for row, entries in given.rows():
-        first, label = (*entries, "")[:2]
-        label = "" if members.nodal else label.upper()
-        what = np.array([int(first)]) if is_number(first) and len(first) <= 18 else first
-        members.parts.append((label, what, "", given.at(row)))
+        if not entries:
+            continue
+        first, label = entries[0], "" if members.nodal else "".join(entries[1:2]).upper()
+        if is_number(first):
+            numbers.setdefault(label, (row, []))[1].append(given.integer(first, row))
+        else:
+            members.parts.append((label, first, "", given.at(row)))
+    for label, (row, every) in numbers.items():
+        members.parts.append((label, np.array(every, dtype=np.int64), "", given.at(row)))
     return f"surface of {'nodes' if members.nodal else 'faces'} {members.spelled}"
+
+
+def _check_outside(reading: Reading, given: Card) -> None:
+    """Refuse parts and instances that begin within others."""
+    if within := reading.part or reading.instance:
+        what = "PART" if reading.part else "INSTANCE"
+        raise given.refused(f"begins before {within} ends; expected *END {what} before it")
 
 
 @mesh_card("PART", "NAME")
 def part(reading: Reading, given: Card) -> str:
     """*PART: what follows belongs to the part."""
+    _check_outside(reading, given)
     reading.part = given.needed("NAME")
     if reading.part in reading.parts:
         raise given.refused(f"is named {reading.part} like another one; expected names that differ")
-    reading.parts[reading.part] = DeckRegion(given.place)
+    reading.parts[reading.part] = DeckRegion(given.place, given.options["NAME"])
     return f"part {reading.part}"
 
 
@@ -163,12 +184,14 @@ def end_assembly(reading: Reading, given: Card) -> None:
 def instance(reading: Reading, given: Card) -> str:
     """*INSTANCE: a part that is moved, first by a vector and then about an axis."""
     name, of = given.needed("NAME"), given.needed("PART")
+    _check_outside(reading, given)
     if of not in reading.parts:
         known = ", ".join(reading.parts) or "none"
         raise given.refused(f"is of the part {of}, which is not in the deck; expected one of {known}")
     if name in reading.instances:
         raise given.refused(f"is named {name} like another one; expected names that differ")
-    made = reading.parts[of].copied()
+    reading.parts[of].is_used = True
+    made = reading.parts[of].copied(given.place, given.options["NAME"].strip('"'))
     if len(given.data) > 2:
         raise given.refused(f"has {len(given.data)} lines of data; expected a translation and a rotation at most")
     if given.data:

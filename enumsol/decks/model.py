@@ -1,19 +1,21 @@
 """A deck as a plain description: arrays and small records, which know nothing of contact problems.
 
-While it is read, nodes, elements, sets and surfaces belong to a `DeckRegion`: the deck itself, a part, or an instance of a
-part. `enumsol.decks.assembly` puts them together to what `Deck` holds in the end: one list of nodes and one of elements
-for everything, and sets and surfaces by the rows in these.
+While it is read, nodes, elements, sets and surfaces belong to a `DeckRegion`: the deck itself, a part, or an instance
+of a part. `enumsol.decks.assembly` puts them together to what `Deck` holds in the end: one list of nodes and one of
+elements for everything, and sets and surfaces by the rows in these.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 from pathlib import Path
 
 import numpy as np
 
 from enumsol.decks.cards import DeckPlace, is_number, key
 from enumsol.decks.elements import ElementType
+from enumsol.decks.steps import Analysis
 from enumsol.errors import InvalidArgumentError
 from enumsol.support.array_types import Floats, Integers
 from enumsol.support.messages import listed
@@ -170,6 +172,8 @@ class DeckRegion:
     Attributes
     ----------
     place : DeckPlace or None
+    spelled : str
+        Name of the part or the instance as it is written.
     nodes : list of (DeckPlace, labels, points)
     blocks : list of ElementBlock
     sets : dict of ("NSET", "ELSET" or "SURFACE", key) to Members
@@ -178,9 +182,12 @@ class DeckRegion:
     translation : (3,) array
     rotation : (7,) array or None
         Two points on an axis, and degrees about it, for after the translation.
+    is_used : bool
+        Whether there is an instance of the part.
     """
 
     place: DeckPlace | None = None
+    spelled: str = ""
     nodes: list[tuple[DeckPlace, Integers, Floats]] = field(default_factory=list)
     blocks: list[ElementBlock] = field(default_factory=list)
     sets: dict[tuple[str, str], Members] = field(default_factory=dict)
@@ -188,16 +195,16 @@ class DeckRegion:
     orientations: dict[str, Orientation] = field(default_factory=dict)
     translation: Floats = field(default_factory=lambda: np.zeros(3))
     rotation: Floats | None = None
+    is_used: bool = False
 
     def members(self, kind: str, spelled: str, place: DeckPlace) -> Members:
         """Members of a set or surface, which begins here if its name is new."""
         return self.sets.setdefault((kind, key(spelled)), Members(place, spelled.strip('"')))
 
-    def copied(self) -> DeckRegion:
+    def copied(self, place: DeckPlace, spelled: str) -> DeckRegion:
         """Copy for an instance, which may get more."""
         sets = {name: replace(own, parts=[*own.parts]) for name, own in self.sets.items()}
-        return DeckRegion(
-            self.place, [*self.nodes], [*self.blocks], sets, [*self.sections], dict(self.orientations)
+        return DeckRegion(place, spelled, [*self.nodes], [*self.blocks], sets, [*self.sections], dict(self.orientations)
         )  # fmt: skip
 
     def moved(self, points: Floats) -> Floats:
@@ -256,6 +263,8 @@ class Deck:
     orientations : dict of keys to Orientation
     instances : dict of keys ("" for the deck itself) to (first row of nodes, behind the last, first row of elements,
         behind the last)
+    analysis : Analysis
+        Steps, contacts and constraints.
     account : list of Account
     """
 
@@ -272,9 +281,10 @@ class Deck:
     sections: list[Section] = field(default_factory=list)
     orientations: dict[str, Orientation] = field(default_factory=dict)
     instances: dict[str, tuple[int, int, int, int]] = field(default_factory=dict)
+    analysis: Analysis = field(default_factory=Analysis)
     account: list[Account] = field(default_factory=list)
 
-    @property
+    @cached_property
     def element_labels(self) -> Integers:
         """Numbers (M,) of all elements in the deck."""
         return np.concatenate([np.zeros(0, dtype=np.int64), *(block.labels for block in self.blocks)])

@@ -5,11 +5,13 @@ A new card is a function with `@card(...)` in one of the modules whose names end
 
 from __future__ import annotations
 
+import difflib
 from collections.abc import Callable, Collection
 from dataclasses import dataclass, field
 
 from enumsol.decks.cards import Card
 from enumsol.decks.model import Account, Deck, DeckRegion, Material
+from enumsol.decks.steps import Analysis
 
 #: Function that puts a card into the description, and returns what became of it in words; None for no words.
 Reader = Callable[["Reading", Card], str | None]
@@ -49,6 +51,11 @@ class Reading:
     material: Material | None = None
 
     @property
+    def analysis(self) -> Analysis:
+        """Description that cards of steps, contacts and constraints are put into."""
+        return self.deck.analysis
+
+    @property
     def region(self) -> DeckRegion:
         """Region that nodes, elements and sets are put into."""
         if self.part:
@@ -64,7 +71,8 @@ class Reading:
             It is not known, or not as expected.
         """
         name = compact(card.name)
-        if self.bare and not (name in CARDS and CARDS[name].of_mesh):
+        close = [] if name in CARDS or name in HARMLESS else difflib.get_close_matches(name, CARDS, n=1, cutoff=0.8)
+        if self.bare and not any(CARDS[own].of_mesh for own in (name, *close) if own in CARDS):
             return
         if name in self.ignore:
             self.account(card, "not used, as you say", used=False)
@@ -79,7 +87,7 @@ class Reading:
             self.account(card, f"not used: {HARMLESS[name]}", used=False)
         else:
             raise card.refused(
-                f"is not read, and may change the answer; expected other cards, or "
+                f"is not read, and may change the answer; expected {f'*{close[0]}' if close else 'other cards'}, or "
                 f'--ignore {card.name.replace(" ", "")} (in Python ignore=["..."]) to do without it'
             )
 

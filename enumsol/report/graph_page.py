@@ -12,7 +12,7 @@ from enumsol.branches.claims import ranges_text
 from enumsol.branches.elements import Arc, Vertex, VertexKind, shape_of
 from enumsol.branches.figures.curves import QUANTITIES, Curve, curves, side_by_side
 from enumsol.branches.figures.panels import colour_of, family_states
-from enumsol.branches.graph_data import branch_stability
+from enumsol.branches.graph_data import about_stability, branch_stability
 from enumsol.model.problem import ContactProblem
 from enumsol.report.body import body_record
 from enumsol.report.parts import (
@@ -29,7 +29,6 @@ from enumsol.report.parts import (
     table_text,
     with_unit,
 )
-from enumsol.roots.root_set import ABOUT_STABILITY
 from enumsol.support.messages import counted
 
 if TYPE_CHECKING:
@@ -57,7 +56,7 @@ def graph_page(graph: BranchGraph, heading: Heading) -> str:
         _facts(graph, heading.units),
         [
             *graph.claims.sentences(graph.uniqueness_bound),
-            *([] if graph.verdicts is None else [f"{ABOUT_STABILITY[0].upper()}{ABOUT_STABILITY[1:]}."]),
+            *([] if graph.verdicts is None else [f"{about_stability(graph).capitalize()}."]),
         ],
         _certified(graph),
         graph.problem.fingerprint,

@@ -14,7 +14,7 @@ from enumsol.search.stability import Proven, StabilitySearch
 from enumsol.support.arguments import shown
 from enumsol.support.immutable import Sealed
 from enumsol.support.messages import counted
-from enumsol.trusted.motions_of_body import BodyMotions, Setting, friction_over
+from enumsol.trusted.motions_of_body import BodyMotions, Setting, friction_directions, friction_over
 from enumsol.trusted.running_away import Motion, everywhere
 
 if TYPE_CHECKING:
@@ -142,22 +142,23 @@ class Equilibria:
 
     def settings(self, root: Root, *, every: bool = False) -> Iterator[Setting]:
         """Parts of the body with nodes at their limit, or all."""
-        forces = None if root.enclosure is None or self.body.tangents == 1 else root.enclosure.lambda_t
         F = friction_over(self.problem, root.alpha, root.alpha)
-        return self.settings_of(root.active, F, forces, self._unsure(root), every=every)
+        known = None if self.body.tangents == 1 else root.enclosure
+        directions = None if known is None else friction_directions(known.lambda_t, F)
+        return self.settings_of(root.active, F, directions, self._unsure(root), every=every)
 
     def settings_of(
         self,
         active: Sequence[frozenset[ContactStatus]],
         F: list[Ball],
-        forces: Floats | None = None,
+        directions: Ball | None = None,
         unsure: tuple[int, ...] = (),
         *,
         every: bool = False,
     ) -> Iterator[Setting]:
-        """Parts of the body for statuses that hold, coefficients by axis and, in 3D, bounds of lambda_t (p, 2, 2)."""
+        """Parts of the body for statuses that hold, coefficients by axis and, in 3D, directions of friction (p, 2)."""
         codes = [frozenset(_CODES[status] for status in statuses) for statuses in active]
-        return self.body.settings(codes, F, forces, unsure, every=every)
+        return self.body.settings(codes, F, directions, unsure, every=every)
 
     @staticmethod
     def _unsure(root: Root) -> tuple[int, ...]:

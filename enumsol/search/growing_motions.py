@@ -27,6 +27,8 @@ if TYPE_CHECKING:
 STRIDE = 16.0
 #: Nodes at their limit up to which all sets of them are tried, and degrees of freedom up to which a spectrum is known.
 _ALL_SETS, _SPECTRUM = 8, 1500
+#: Nodes up to which all sets of them are counted for one certificate, and loads that are tried for it.
+_COUNTED, _LOADS = 8, 12
 #: mu at which signs of determinants are compared within a range.
 _SAMPLES = 48
 #: Relative widths in which a motion is looked for, narrow ones first.
@@ -100,17 +102,19 @@ class GrowingMotions:
     def crossing_near(self, known: Growing) -> Crossing | None:
         """A range of mu in which some motion is proven to grow, about one that is known for other coefficients."""
         unit = float(np.exp2(np.round(np.log2(known.low))))
-        high = next((unit * STRIDE**k for k in range(1, 6) if self._definite_at(unit * STRIDE**k)), None)
-        if high is None:
-            return None
-        for low in (unit / 4, unit / STRIDE, unit / STRIDE**2, 0.0):
-            K = self.stiffness.at(low)
-            push = None if K is None else _push(self.motions.slopes.mid.T @ K.mid @ self.motions.moves.mid)
-            if push is None:
+        below, above = (unit / 4, unit / STRIDE, unit / STRIDE**2, 0.0), [unit * STRIDE**k for k in range(1, 6)]
+        for pushed, definite in ((below, above), (above, below)):
+            end = next((mu for mu in definite if self._definite_at(mu)), None)
+            if end is None:
                 continue
-            tried = Crossing(low, high, push)
-            if tried.holds(self.stiffness, self.motions):
-                return tried
+            for mu in pushed:
+                K = self.stiffness.at(mu)
+                L = None if K is None else self.motions.slopes.mid.T @ K.mid @ self.motions.moves.mid
+                push = None if L is None else _push(L)
+                load = None if L is None or push is not None or not mu else _load(L)
+                tried = Crossing(min(mu, end), max(mu, end), push, load)
+                if tried.holds(self.stiffness, self.motions):
+                    return tried
         return None
 
     def _definite_at(self, mu: float) -> bool:
@@ -271,6 +275,29 @@ def _push(L: Floats) -> Floats | None:
     bounds = [(0.0, None)] * k + [(None, None)]
     found = scipy.optimize.linprog(goal, limits, np.zeros(k), whole, [1.0], bounds)
     return found.x[:k] * unit if found.status == 0 and found.x[k] > 0 else None
+
+
+def _load(L: Floats) -> Floats | None:
+    """q for which the signs of all solutions of 0 <= x, q + L x >= 0 are known best, if they do not add up to 1."""
+    k = len(L)
+    if not 0 < k <= _COUNTED or L.shape != (k, k):
+        return None
+    unit = 1.0 / np.sqrt(np.maximum(np.abs(L.diagonal()), np.finfo(float).tiny))
+    scaled = L * unit[:, None] * unit
+    loads = np.random.default_rng(k).normal(size=(k, _LOADS))
+    margins, degrees = np.full(_LOADS, np.inf), np.zeros(_LOADS)
+    for chosen in itertools.product((False, True), repeat=k):
+        own, x = np.array(chosen), np.zeros((k, _LOADS))
+        part = scaled[np.ix_(own, own)]
+        try:
+            x[own] = -np.linalg.solve(part, loads[own])
+        except np.linalg.LinAlgError:
+            return None
+        least = np.min(np.where(own[:, None], x, loads + scaled @ x), axis=0)
+        margins = np.minimum(margins, np.abs(least))
+        degrees += np.where(least > 0, np.sign(np.linalg.det(part)), 0.0)
+    best = int(np.argmax(np.where(degrees != 1, margins, -1.0)))
+    return loads[:, best] / unit if degrees[best] != 1 else None
 
 
 def _determinant(matrices: Floats) -> Floats:

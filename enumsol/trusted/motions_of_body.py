@@ -105,12 +105,17 @@ class BodyMotions:
         first = np.array([of_nodes.indices[of_nodes.indptr[i]] for i in range(problem.p)])
         self._node_part = together[first]
         self._stiffness: dict[Any, DynamicStiffness] = {}
+        # F0 and F1 of F0 + alpha F1, by node and axis
+        parts = (np.asarray(part).reshape(problem.p, -1).tolist() for part in problem.affine_friction)
+        self._friction = [
+            [(Fraction(x), Fraction(y)) for x, y in zip(*pair, strict=True)] for pair in zip(*parts, strict=True)
+        ]
 
     def settings(
         self,
         held: Sequence[Collection[int]],
         F: list[Ball],
-        forces: Floats | None = None,
+        directions: Ball | None = None,
         unsure: tuple[int, ...] = (),
         *,
         every: bool = False,
@@ -123,8 +128,8 @@ class BodyMotions:
             Per node the codes of the statuses that hold; in 3D any one but open and stick means slip.
         F : list of Balls (p,)
             Coefficients by axis.
-        forces : (p, 2, 2) array, optional
-            In 3D: bounds of lambda_t.
+        directions : Ball (p, 2), optional
+            In 3D: lambda_t / F by axis, up to a positive factor for every node.
         unsure : tuple of int
             Nodes of which bounds leave open whether they are at their limit.
         """
@@ -133,7 +138,7 @@ class BodyMotions:
             nodes = np.flatnonzero(self._node_part == part).tolist()
             kinds = {i: _kind(held[i], rubs[i]) for i in nodes}
             if every or "limit" in kinds.values():
-                moves = {i: _limit(held[i], F, i, forces) for i, kind in kinds.items() if kind == "limit"}
+                moves = {i: self._limit(held[i], F, i, directions) for i, kind in kinds.items() if kind == "limit"}
                 yield self._setting(F, int(part), kinds, moves, unsure)
 
     def _setting(
@@ -176,6 +181,31 @@ class BodyMotions:
             tuple(k for k, i in enumerate(moves) if i in unsure),
         )
         return Setting(self._stiffness_of(part, dofs, rows), motions, dofs, rows, list(moves), unloaded)
+
+    def _limit(self, held: Collection[int], F: list[Ball], i: int, directions: Ball | None) -> tuple[list[Ball], Ball]:
+        """Tangential move of a node at its limit, by axis, and by how much T_i sinks meanwhile (theory, (15.3))."""
+        if len(F) == 1:
+            sign = 1.0 if SLIP_PLUS in held else -1.0
+            return [Ball.exact(np.array(sign))], F[0][i]
+        assert directions is not None
+        larger = max(range(len(F)), key=lambda k: float(F[k].mid[i]))
+        d, length = direction(directions[i])
+        return [d[k] * self._ratio(F, i, larger, k) for k in range(len(F))], F[larger][i] * length
+
+    def _ratio(self, F: list[Ball], i: int, larger: int, k: int) -> Ball:
+        """The larger coefficient over that along an axis; zero where there is no friction."""
+        if k == larger:
+            return Ball.exact(np.array(1.0))
+        if F[k].mid[i] == 0:
+            # no force is along that axis
+            return Ball.exact(np.array(0.0))
+        (above, rate), (below, other) = self._friction[i][larger], self._friction[i][k]
+        if above * other != below * rate:
+            return F[larger][i] * reciprocal(F[k][i])
+        # for all alpha
+        exact = above / below if below else rate / other
+        value = float(exact)
+        return Ball(np.array(value), np.array(0.0 if Fraction(value) == exact else 2 * UNIT * abs(value) + TINY))
 
     def _stiffness_of(self, part: int, dofs: Integers, rows: list[int]) -> DynamicStiffness:
         """Stiffness of some rows of a part."""
@@ -220,24 +250,26 @@ def _kind(held: Collection[int], friction: bool) -> str:
     return "limit" if friction and codes != {STICK} else "stuck"
 
 
-def _limit(held: Collection[int], F: list[Ball], i: int, forces: Floats | None) -> tuple[list[Ball], Ball]:
-    """Tangential move of a node at its limit, by axis, and by how much T_i sinks meanwhile (theory, (15.3))."""
-    if len(F) == 1:
-        sign = 1.0 if SLIP_PLUS in held else -1.0
-        return [Ball.exact(np.array(sign))], F[0][i]
-    assert forces is not None
-    inverse = [reciprocal(f[i]) for f in F]
-    force = [hull([Ball.exact(end) for end in ends]) for ends in forces[i]]
-    shares = [x * y for x, y in zip(force, inverse, strict=True)]
-    length = float(np.hypot(*(x.mid for x in shares))) or TINY
-    # |v / |v| - m / |m|| <= 2 |v - m| / |m|
-    off = 2.0 * float(np.hypot(*(x.rad for x in shares))) / length * SAFE + 8 * UNIT
-    typical = max(float(f.mid[i]) for f in F)
-    moves = [
-        Ball(np.array(typical * float(x.mid) / length), np.array(typical * off * SAFE)) * y
-        for x, y in zip(shares, inverse, strict=True)
-    ]
-    return moves, Ball.exact(np.array(typical))
+def friction_directions(forces: Floats, F: list[Ball]) -> Ball:
+    """lambda_t / F by axis, (p, 2), from bounds of lambda_t, (p, 2, 2); zero along axes without friction."""
+    found = hull([Ball.exact(forces[..., 0]), Ball.exact(forces[..., 1])])
+    for k, f in enumerate(F):
+        for i in range(len(found.mid)):
+            found[i, k] = found[i, k] * reciprocal(f[i])
+    return found
+
+
+def direction(v: Ball) -> tuple[Ball, Ball]:
+    """The directions of all vectors in a ball, (2,): vectors with a part of one along its middle, and their lengths."""
+    length = float(np.hypot(*v.mid)) or TINY
+    sine = float(np.hypot(*v.rad)) / length * SAFE
+    x, y = v.mid / length
+    if not sine < 0.99:
+        # any unit vector
+        return Ball(np.array([x, y]), np.full(2, 3.0)), Ball.exact(np.array(1.0))
+    cosine = np.sqrt(1.0 - sine * sine)
+    aside = np.abs([y, x]) * (sine / cosine * SAFE) + 8 * UNIT
+    return Ball(np.array([x, y]), aside), Ball(np.array(1.0), np.array((1.0 / cosine - 1.0) * SAFE + 8 * UNIT))
 
 
 def reciprocal(F: Ball) -> Ball:

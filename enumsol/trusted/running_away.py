@@ -8,6 +8,7 @@ its limit r_i = F y_n - s y_t = T_i'K(mu) R x is at least zero, too, and x_i r_i
 
 from __future__ import annotations
 
+import itertools
 from dataclasses import dataclass
 from fractions import Fraction
 from functools import cached_property
@@ -388,28 +389,56 @@ class Crossing:
     ----------
     low, high : float
         Some motion grows for a mu between them.
-    push : (k,) array, >= 0
-        Rows r with these weights are negative at ``low`` for all x >= 0 but zero.
+    push : (k,) array, >= 0, or None
+        Rows r with these weights are negative at one end for all x >= 0 but zero; at the other the form is definite.
+    load : (k,) array or None
+        In place of ``push``: the ways in which the nodes go on under r = load at that end do not add up to one.
     """
 
     low: float
     high: float
-    push: Floats
+    push: Floats | None = None
+    load: Floats | None = None
 
     def holds(self, stiffness: Stiffness, motions: Motions) -> bool:
         """True if it is proven; only where no node touches and all are at their limit for certain."""
-        if motions.touching or motions.unsure or not 0 <= self.low < self.high < np.inf:
+        if motions.touching or motions.unsure or not 0 <= self.low < self.high < np.inf or not motions.limits:
             return False
-        if self.push.shape != (motions.limits,) or not np.all(np.isfinite(self.push)) or np.any(self.push < 0):
+        numbers = self.load if self.push is None else self.push
+        if numbers is None or numbers.shape != (motions.limits,) or not np.all(np.isfinite(numbers)):
             return False
         first, last = stiffness.at(self.low), stiffness.at(self.high)
-        if first is None or last is None or not motions.limits:
+        if first is None or last is None:
             return False
+        ends = (self.low, first), (self.high, last)
         with np.errstate(all="ignore"):
-            pushed = Ball.exact(self.push[None]) @ _across(motions.slopes, first, motions.moves)
-            return bool(np.all(pushed.mid + pushed.rad < 0)) and positive(
-                _across(motions.slopes, last, motions.moves).symmetric
+            return any(
+                positive(_across(motions.slopes, other, motions.moves).symmetric) and self._differs(motions, mu, K)
+                for (mu, K), (_, other) in (ends, ends[::-1])
             )
+
+    def _differs(self, motions: Motions, mu: float, K: Ball) -> bool:
+        """True if the degree of x -> min(x, L x) is proven not to be one, or L x >= 0 is complementary to some x."""
+        if self.push is not None:
+            pushed = Ball.exact(self.push[None]) @ _across(motions.slopes, K, motions.moves)
+            return bool(np.all(self.push >= 0) and np.all(pushed.mid + pushed.rad < 0))
+        # at rest a complementary x would be no motion that grows
+        return self.load is not None and mu > 0 and _degree(K, motions, self.load) not in (1, None)
+
+
+def _degree(K: Ball, motions: Motions, load: Floats) -> int | None:
+    """The sum of the signs of det L over all nodes that slide in 0 <= x, r = load + L x >= 0; None if not proven."""
+    k, total, none = motions.limits, 0, Ball.exact(np.zeros(len(K.mid)))
+    if 2**k > MOST_WAYS:
+        return None
+    for slides in itertools.chain.from_iterable(itertools.combinations(range(k), size) for size in range(k + 1)):
+        own = list(slides)
+        answer, _ = rates_in(K, motions, none, Behaviour(slides), Ball.exact(load))
+        sign = determinant_sign(_across(motions.slopes[:, own], K, motions.moves[:, own])) if answer and own else 1
+        if answer is None or not sign:
+            return None
+        total += sign if answer else 0
+    return total
 
 
 def _slope(motions: Motions, node: Touching, code: int) -> Ball:

@@ -1,8 +1,10 @@
 """Which arcs run away: verdicts of graphs, and that what follows shows them."""
 
+import json
 import time
 from itertools import pairwise
 
+import networkx as nx
 import numpy as np
 import pytest
 
@@ -68,14 +70,68 @@ def test_what_is_cut_short_goes_on(triangle):
     assert triangle.stability() == found
 
 
-def test_no_mass_and_3d_are_refused():
+def test_no_mass_is_refused():
     problem = enumsol.ContactProblem(np.eye(2), [[1, 0]], [[0, 1]], [1, 2], friction=0.5)
-    graph = enumsol.branch_graph(problem, (0, 1))
-    with pytest.raises(enumsol.InvalidArgumentError, match="no mass and no mesh; expected mass"):
-        graph.stability()
-    space = enumsol.branch_graph(enumsol.gallery.one_node_3d(), (0, 1))
-    with pytest.raises(enumsol.InvalidArgumentError, match=r"roots_at\(alpha\)\.stability\(\)"):
-        space.stability()
+    for body in (problem, enumsol.gallery.one_node_3d()):
+        graph = enumsol.branch_graph(body, (0, 1))
+        with pytest.raises(enumsol.InvalidArgumentError, match="no mass and no mesh; expected mass"):
+            graph.stability()
+
+
+def test_files_keep_verdicts_as_what_they_say(square, tmp_path):
+    square.save(tmp_path / "square.json")
+    loaded = enumsol.BranchGraph.load(tmp_path / "square.json")
+    assert loaded.verdicts == square.verdicts
+    assert (square.verdicts_read, loaded.verdicts_read) == (False, True)
+    assert "as the file of this graph says, which nothing has checked" in repr(loaded)
+    assert (square.summary()["stability_read"], loaded.summary()["stability_read"]) == (False, True)
+    assert loaded.stability() == square.stability()
+    assert not loaded.verdicts_read
+    assert repr(loaded) == repr(square)
+
+
+def test_verdicts_that_a_file_only_claims_are_found_again(square, tmp_path):
+    file = tmp_path / "square.json"
+    square.save(file)
+    record = json.loads(file.read_text())
+    for spans in record["verdicts"]:
+        for span in spans:
+            span["verdict"] = QUIET
+    file.write_text(json.dumps(record))
+    loaded = enumsol.BranchGraph.load(file)
+    assert {span.verdict for spans in loaded.verdicts for span in spans} == {QUIET}
+    assert loaded.stability() == square.stability()
+
+
+@pytest.mark.parametrize("change", ["missing", "gap", "backwards", "word", "number"])
+def test_verdicts_that_do_not_fit_the_arcs_are_refused(square, tmp_path, change):
+    file = tmp_path / "square.json"
+    square.save(file)
+    record = json.loads(file.read_text())
+    first = record["verdicts"][0]
+    if change == "missing":
+        del record["verdicts"][0]
+    elif change == "gap":
+        first[0]["high"] = 0.5 * (first[0]["low"] + first[0]["high"])
+    elif change == "backwards":
+        middle = first[0]["high"] + 1
+        first[:] = [first[0] | {"high": middle}, first[0] | {"low": middle}]
+    elif change == "word":
+        first[0]["verdict"] = "stable"
+    else:
+        first[0]["growth"] = [1, None]
+    file.write_text(json.dumps(record))
+    with pytest.raises(enumsol.InvalidArgumentError, match=r"square\.json"):
+        enumsol.BranchGraph.load(file)
+
+
+def test_graphml_has_verdicts(square, untold, tmp_path):
+    for graph, expected in ((square, square.to_frame().stability.tolist()), (untold, [None] * len(untold.arcs))):
+        graph.write_graphml(tmp_path / "square.graphml")
+        read = nx.read_graphml(tmp_path / "square.graphml", force_multigraph=True)
+        words = {int(number): data.get("stability") for _, _, number, data in read.edges(keys=True, data=True)}
+        assert [words[k] for k in range(len(graph.arcs))] == expected
+        assert ("stability" in read.graph) is (graph is square)
 
 
 def lines_of(figure, colour):

@@ -39,7 +39,8 @@ SEARCH = (
 #: What may write a false proof and accept it: of these modules the search uses no more than these names; None: all.
 SHARED = {
     "arithmetic.balls": {
-        *("Ball", "SAFE", "TINY", "UNIT", "factor_above", "nearly_singular", "smaller", "solution", "upper_norm")
+        *("Ball", "SAFE", "TINY", "UNIT", "factor_above", "hull", "nearly_singular"),
+        *("smaller", "solution", "upper_norm"),
     },
     "arithmetic.rationals": {
         *("as_objects", "is_positive_definite", "rational", "rational_matrix", "simplest", "to_fraction")
@@ -67,7 +68,9 @@ SHARED = {
     "trusted.uniqueness": {*("ClosedSolution", "closed_solution", "numbers_of", "only_solution", "same_solution")},
     "trusted.at_alpha": {"VerifiedSelection", "settled_selection", "solve_selection"},
     "trusted.precise_at_alpha": {"PreciseAtAlpha"},
-    "trusted.motions_of_body": {"BodyMotions", "Setting", "friction_over"},
+    "trusted.motions_of_body": {
+        *("BodyMotions", "Setting", "direction", "friction_directions", "friction_over", "reciprocal"),
+    },
     "trusted.running_away": None,
     "trusted.quadratic_forms": {"EnclosedForm", "Equations", "QuadraticForm"},
     "trusted.status_rows": None,

@@ -1,6 +1,7 @@
 """Ranges of mu in which some motion grows by Theorem 15.6, against all sets of sliding nodes in floats."""
 
 import dataclasses
+from collections import Counter
 
 import numpy as np
 import pytest
@@ -71,6 +72,58 @@ def test_crossings_anywhere():
     assert accepted
 
 
+@pytest.mark.slow
+def test_counted_ways_to_go_on_anywhere():
+    """What is counted under any load, at either end, is not one only where the judge finds a motion in between."""
+    rng, accepted = np.random.default_rng(7), Counter()
+    for k in range(60):
+        data = random_motion(rng)
+        stiffness, motions = setting(*data)
+        if not motions.limits:
+            continue
+        judged = None
+        for _ in range(6):
+            low, high = sorted(10.0 ** rng.uniform(-3, 4, 2))
+            tried = Crossing(float(low), float(high), load=rng.normal(size=motions.limits))
+            if tried.holds(stiffness, motions):
+                judged = [mu for mu, *_ in growing_motions(*data)] if judged is None else judged
+                accepted[motions.limits] += 1
+                assert any(tried.low <= mu <= tried.high for mu in judged), k
+    assert accepted.total() >= 10
+    assert max(accepted) >= 2
+
+
+def test_a_motion_that_no_weights_find():
+    """L(0) has a column of positive entries, so that no weighted rows are negative; the ways to go on do not add up."""
+    L = np.array([[0.56, -2.24], [0.20, -0.96]])
+    F = np.array([1.0, 1.0])
+    K = np.block([[9 * np.eye(2), np.zeros((2, 2))], [np.zeros((2, 2)), 4 * np.eye(2)]])
+    K[:2, 2:] = K[2:, 2:] - L  # T'K R = K_tt - K_nt
+    K[2:, :2] = K[:2, 2:].T
+    assert np.linalg.eigvalsh(K)[0] > 0
+    data = (K, np.eye(4), np.eye(4)[:2], np.eye(4)[2:], F, ["limit", "limit"], np.ones(2))
+    stiffness, motions = setting(*data)
+    crossing = GrowingMotions(stiffness, motions).crossing_near(StabilitySearch(stiffness, motions).run().growing[0][0])
+    assert crossing.push is None
+    assert crossing.holds(stiffness, motions)
+    assert any(crossing.low <= mu <= crossing.high for mu, *_ in growing_motions(*data))
+    for change in ({"low": 0.0}, {"load": np.zeros(2)}, {"load": crossing.load[:1]}, {"load": None}, {"high": np.inf}):
+        assert not dataclasses.replace(crossing, **change).holds(stiffness, motions)
+
+
+def test_a_motion_that_begins_to_grow_where_the_form_is_definite():
+    """At rest the form is definite, and for large growth rates the mass pushes the node on."""
+    A, M = np.array([[5.0, 0.4], [0.4, 2.0]]), np.array([[4.0, 0.9], [0.9, 1.0]])
+    data = (A, M, np.eye(2)[:1], np.eye(2)[1:], np.array([1.5]), ["limit"], np.ones(1))
+    stiffness, motions = setting(*data)
+    ((known, _),) = StabilitySearch(stiffness, motions).run().growing
+    crossing = GrowingMotions(stiffness, motions).crossing_near(known)
+    assert crossing.holds(stiffness, motions)
+    # (2 - 0.6) + mu (1 - 1.35) = 0
+    assert crossing.low < 1.4 / 0.35 < crossing.high
+    assert not dataclasses.replace(crossing, high=3.9).holds(stiffness, motions)
+
+
 @pytest.mark.parametrize("change", [{"low": -1.0}, {"high": np.inf}, {"low": np.nan}, {"high": 1e-9}])
 def test_ranges_that_make_no_sense(change):
     stiffness, motions = setting(*ONE_NODE)
@@ -97,6 +150,17 @@ def test_verdicts_along_arcs_are_those_of_their_roots():
             if span.growth is not None:
                 (found,) = [enumsol.stability(problem, root) for root in there]
                 assert span.growth[0] <= found.growth_rates[0] <= span.growth[1]
+
+
+def test_an_arc_of_a_wedge_along_which_two_nodes_slide():
+    """Of a wedge with five equilibria; its motions were found at single alphas only (theory, Theorem 15.7)."""
+    problem = enumsol.gallery.get("wedge-8-5").build()
+    graph = enumsol.branch_graph(problem, (2.5, 3))
+    (arc,) = [arc for arc in graph.arcs if [str(of) for of in arc.statuses].count("open") == 6 and arc.index == -1]
+    (span,) = ArcStabilities(problem).spans(arc)
+    assert span.verdict == "runs away"
+    (root,) = [root for root in graph.roots_at(2.75) if root.statuses == arc.statuses]
+    assert span.growth[0] <= enumsol.stability(problem, root).growth_rates[0] <= span.growth[1]
 
 
 def test_parts_of_a_body_do_not_share_what_is_known_of_them():

@@ -19,7 +19,7 @@ from enumsol.support.deadlines import look, tell
 from enumsol.trusted.space.curve_events import CurveMotion
 from enumsol.trusted.space.curve_parts import LinkParts, Place, Run, Turn, in_order, put_behind, up_to_bound
 from enumsol.trusted.space.sector_rows import OPEN, STICK
-from enumsol.trusted.space.solution_curve import SLIP
+from enumsol.trusted.space.solution_curve import SLIP, only_curve
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
@@ -267,17 +267,22 @@ class LinkCutter(LinkParts):
 
     def _between(self, start: Place, end: Place) -> SolutionCurve | None:
         """A curve in a box of its own that has two places of the link."""
-        chord = end.x - start.x
-        length = float(self.border @ chord)
-        if not length > 0:
-            return None
-        changing = [i for i, pair in enumerate(zip(start.codes, end.codes, strict=True)) if pair[0] != pair[1]]
-        middle, half = start.x + 0.5 * chord, 0.5 * _LONGER * length
-        curve = curve_around(self.problem, middle, chord / length, self.border, half, changing, roomy=False)
-        if curve is None:
-            return None
-        # a curve that only alpha changes along needs a box of the size of rounding errors
-        least = _ROUNDED * np.maximum(*(place.point.at(0.0).rad for place in (start, end)))
-        if np.any(curve.box.radius < least):
-            return self.curve_in(replace(curve.box, radius=np.maximum(curve.box.radius, least)), start, end)
-        return curve if self.has(curve, start, end) else None
+        return curve_between(self.problem, start, end, self.border)
+
+
+def curve_between(problem: AlphaProblem, start: Place, end: Place, border: Array) -> SolutionCurve | None:
+    """A curve in a box of its own that has two places; None where none is proven to have them."""
+    chord = end.x - start.x
+    length = float(border @ chord)
+    if not length > 0:
+        return None
+    changing = [i for i, pair in enumerate(zip(start.codes, end.codes, strict=True)) if pair[0] != pair[1]]
+    middle, half = start.x + 0.5 * chord, 0.5 * _LONGER * length
+    curve = curve_around(problem, middle, chord / length, border, half, changing, roomy=False)
+    if curve is None:
+        return None
+    # a curve that only alpha changes along needs a box of the size of rounding errors
+    least = _ROUNDED * np.maximum(*(place.point.at(0.0).rad for place in (start, end)))
+    if np.any(curve.box.radius < least):
+        curve = only_curve(problem, replace(curve.box, radius=np.maximum(curve.box.radius, least)))
+    return curve if curve is not None and LinkParts.has(curve, start, end) else None
