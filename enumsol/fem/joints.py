@@ -301,9 +301,10 @@ def _settle(held: Supports, found: Joints) -> None:
     """Hold the components of nodes to which equations leave nothing free, as supports do."""
     if not found.equations:
         return
-    more = found.references.count - held.fixed.size
-    arrays = (np.pad(own.ravel(), (0, more)) for own in (held.fixed, held.values, held.slopes))
-    given = eliminated(*arrays, found.equations, named=found.references.named)  # type: ignore[arg-type]
+    more = np.zeros(found.references.count - held.fixed.size)
+    fixed = np.append(held.fixed, more > 0)
+    values, slopes = np.append(held.values, more), np.append(held.slopes, more)
+    given = eliminated(fixed, values, slopes, found.equations, named=found.references.named)
     lone = (np.diff(given.T.indptr) == 0)[: held.fixed.size].reshape(held.fixed.shape) & ~held.fixed
     for target, own in ((held.values, given.offset), (held.slopes, given.slope)):
         target[lone] = own[: held.fixed.size].reshape(held.fixed.shape)[lone]
