@@ -213,7 +213,7 @@ def _weights(body: NodalBasis, mesh: PartedMesh, parts: list[str]) -> Floats:
     total = np.zeros(len(mesh.points))
     for part in parts:
         if part in mesh.facets:
-            total += body.on_part(mesh.part(part), part, lambda v, _: v[0])[:, 0]
+            total += body.on_part(mesh.part(part), part, lambda _: 1.0)[:, 0]
         else:
             total[mesh.nodes(part)] += 1.0
     return total

@@ -41,13 +41,12 @@ if TYPE_CHECKING:
     from enumsol.trusted.quadratic_forms import EnclosedForm
     from enumsol.trusted.reference import Reference
     from enumsol.trusted.space.pieces import AlphaPiece
-    from enumsol.trusted.space.product_forms import Ellipsoid
     from enumsol.trusted.space.sector_margins import SlipForm
     from enumsol.trusted.space.space_uniqueness import LeafReference
     from enumsol.trusted.uniqueness import ClosedSolution
 
     #: What multipliers bound.
-    Bounded = EnclosedSystem | EnclosedForm | EnclosedPiece | SlipForm | Ellipsoid | AlphaPiece
+    Bounded = EnclosedSystem | EnclosedForm | EnclosedPiece | SlipForm | AlphaPiece
 
 #: Last entry of a record that is to be tested in rational arithmetic.
 RATIONAL = "rational"
@@ -101,12 +100,10 @@ class Excluded(Record):
         if by == RATIONAL and not limits.tree & Tree.PLANE:
             raise RecordError("it cannot be tested in rational arithmetic")
         if len(entries) > 2 and by != RATIONAL:
-            form = limits.check_form(by)
+            limits.check_form(by)
         if not limits.in_space:
             return cls(*multipliers_from(entries[:2], ROW_KINDS * limits.p), by)
         rows, values = multipliers_from(entries[:2], None, ends=2 if limits.tree & Tree.PIECES else 1)
-        if by is not None and any(code != UNDECIDED for code in form.codes) and len(rows):
-            raise RecordError("it has multipliers beside those of a form of products")
         return cls([checked_row(row, limits.p) for row in rows], values, by)
 
     def holds(self, within: Bounded, codes: Codes, errors: float = 1.0) -> bool:
@@ -391,35 +388,27 @@ class Alone(ClosingRecord):
 
 
 @dataclass(frozen=True, eq=False)
-class BoxedRoot(ClosingRecord):
-    """All solutions lie in a box that holds one solution.
+class BoxedRoot(Solved):
+    """All solutions of a complete assignment lie in a box that holds one solution.
 
     Attributes
     ----------
     mid, rad, rho : centre and radius of the box, and its weights of displacements, read where they are needed
     enclosure : EnclosureRecord
-    by : int or None
-        All solutions below the assignment lie in the ellipsoid of the form declared so many before, which lies in the
-        box. Without it the assignment is complete.
     """
 
-    kind, sizes, trees = "l", (7, 8), Tree.SPACE
+    kind, sizes, trees = "l", (7,), Tree.SPACE
 
     mid: Any
     rad: Any
     rho: Any
     enclosure: EnclosureRecord
-    by: int | None = None
 
     @classmethod
     def of(cls, entries: list[Any], limits: Limits) -> BoxedRoot:
         """The box and the enclosure."""
-        mid, rad, rho, *enclosure = entries[:6]
-        if entries[6:]:
-            limits.check_form(entries[6])
-        else:
-            check_complete(limits.codes)
-        return cls(mid, rad, rho, EnclosureRecord(*enclosure), *entries[6:])
+        mid, rad, rho, *enclosure = entries
+        return cls(mid, rad, rho, EnclosureRecord(*enclosure))
 
     def box(self, size: int) -> tuple[Floats, Floats, Floats]:
         """Centre, radius and rho of the box; ValueError where they are no ``size`` numbers each."""
