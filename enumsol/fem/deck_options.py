@@ -5,6 +5,7 @@ Whatever acts on nodes, faces or elements becomes a named part and an option of 
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -14,11 +15,14 @@ from enumsol.errors import InvalidArgumentError
 from enumsol.fem.mesh_files import mesh_of_deck
 
 if TYPE_CHECKING:
+    from collections.abc import Iterable
+
     from enumsol.decks.cards import DeckPlace
     from enumsol.decks.model import Deck, Section
     from enumsol.decks.states import DeckState
     from enumsol.decks.steps import ContactPair
     from enumsol.fem.meshes import PartedMesh
+    from enumsol.fem.scenes import Scene
     from enumsol.support.array_types import Floats, Integers
 
 #: Families of plane elements, and what `mesh_problem` calls them.
@@ -74,6 +78,29 @@ class DeckParts:
     def mesh(self) -> PartedMesh:
         """Mesh of the deck with all of these."""
         return mesh_of_deck(self._deck)
+
+    def node_names(self, mesh_nodes: Iterable[int]) -> list[str | int]:
+        """Numbers in the deck of nodes of its mesh, behind the names of their instances if there are any.
+
+        Nodes in the middle of facets, which elements of 20 nodes do not have, are called so.
+        """
+        own = [block.nodes.ravel() for block in self._deck.blocks if block.type.is_body]
+        used = np.unique(np.concatenate(own))
+        names = [self._deck.node_name(used[node]) if node < len(used) else f"centre-{node}" for node in mesh_nodes]
+        return [int(name) if name.isdigit() else name for name in names]
+
+    def adjusted(self, scene: Scene) -> PartedMesh | None:
+        """Mesh whose contact nodes are moved onto what they face where the deck says so; None if it moves none."""
+        points, first = scene.mesh.points.copy(), 0
+        distances = {(pair.slave, pair.master): pair.adjust for pair in self._deck.analysis.pairs}
+        for group, gaps in scene.gaps_of_groups:
+            own = slice(first, first := first + group.count)
+            distance = None if group.pair is None else distances.get((group.pair.slave, group.pair.master))
+            if distance is not None:
+                near = (gaps <= distance) & (gaps != 0)
+                rows = scene.contacts.rows
+                points[rows.nodes[own][near]] += gaps[near, None] * rows.normals[own][near]
+        return replace(scene.mesh, points=points) if np.any(points != scene.mesh.points) else None
 
 
 # -- the same in all steps -------------------------------------------------------------------------------------------
@@ -198,11 +225,7 @@ def _contacts(deck: Deck) -> dict[str, Any]:
 
 def _gap(pair: ContactPair) -> list[Any]:
     """The gap of a pair, where it is not that of the geometry."""
-    if pair.clearance is not None:
-        return [pair.clearance]
-    if pair.adjust is not None:
-        raise InvalidArgumentError(f"{pair.place}: ADJUST is not read")
-    return []
+    return [] if pair.clearance is None else [pair.clearance]
 
 
 def friction(deck: Deck, step: int) -> dict[str, float]:

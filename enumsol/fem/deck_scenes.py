@@ -19,6 +19,7 @@ from enumsol.errors import InvalidArgumentError, InvalidProblemError
 from enumsol.fem.deck_options import DeckParts, acting, friction, shared
 from enumsol.fem.mesh_problems import mesh_scene
 from enumsol.loading.steps import LoadStep
+from enumsol.model.restart import afresh
 from enumsol.support.arguments import file_path, positive_integer
 from enumsol.support.messages import counted
 
@@ -130,15 +131,21 @@ class DeckModel:
         """
         number = self._number(step)
         if number not in self._scenes:
-            options = self._options[number - 1]
             try:
-                scene = mesh_scene(self.mesh, **options)
-                if any(piece.free_motions(scene.mesh.points, scene.hold) for piece in scene.pieces):
-                    scene = mesh_scene(self.mesh, **options, max_rigid_displacement="auto")
+                self._scenes[number] = self._made(self._options[number - 1])
             except InvalidArgumentError as error:
                 raise InvalidProblemError(f"{self.deck.path}: {error}") from error
-            self._scenes[number] = scene
         return self._scenes[number]
+
+    def _made(self, options: dict[str, Any]) -> Scene:
+        scene = mesh_scene(self.mesh, **options)
+        moved = self._parts.adjusted(scene)
+        if moved is not None:
+            self.mesh = moved
+            scene = mesh_scene(moved, **options)
+        if any(piece.free_motions(scene.mesh.points, scene.hold) for piece in scene.pieces):
+            scene = mesh_scene(self.mesh, **options, max_rigid_displacement="auto")
+        return scene
 
     def problem(self, step: int | None = None) -> AnyProblem:
         """Contact problem at the end of a step (from 1), reached from no load at once.
@@ -150,9 +157,10 @@ class DeckModel:
         """
         scene = self.scene(step)
         try:
-            return scene.problem()
+            problem = scene.problem()
         except (InvalidArgumentError, InvalidProblemError) as error:
             raise InvalidProblemError(f"{self.deck.path}: {error}") from error
+        return afresh(problem, node_ids=tuple(self._parts.node_names(problem.node_ids)))
 
     def steps(self) -> list[LoadStep]:
         """Steps for `histories`, on the problem of any step.
