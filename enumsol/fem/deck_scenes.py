@@ -16,7 +16,8 @@ import numpy as np
 from enumsol.decks.reading import described
 from enumsol.decks.states import states_of
 from enumsol.errors import InvalidArgumentError, InvalidProblemError
-from enumsol.fem.deck_options import DeckParts, acting, friction, shared
+from enumsol.fem.deck_joints import DeckJoints
+from enumsol.fem.deck_options import DeckParts, acting, friction, is_plane, shared
 from enumsol.fem.mesh_problems import mesh_scene
 from enumsol.loading.steps import LoadStep
 from enumsol.model.restart import afresh
@@ -93,8 +94,10 @@ class DeckModel:
         states = self._states()
         self._parts = DeckParts(self.deck)
         common = shared(self.deck, self._parts)
+        joints = DeckJoints(self.deck, self._parts, 2 if is_plane(self.deck) else 3)
+        common |= joints.options
         self._options = [
-            {**common, **acting(self.deck, self._parts, state), "friction": friction(self.deck, number)}
+            {**common, **acting(self.deck, self._parts, state, joints), "friction": friction(self.deck, number)}
             for number, state in enumerate(states, 1)
         ]
 
