@@ -1,7 +1,7 @@
 """Ties, couplings, rigid bodies, equations, springs and axes of nodes of a deck as options of `mesh_problem`.
 
 Nodes of no body become reference points where something depends on them: those of couplings and rigid bodies, which
-turn, and those at ends of springs and in equations, which do not.
+turn, and those in equations, which do not.
 """
 
 from __future__ import annotations
@@ -18,9 +18,13 @@ from enumsol.errors import InvalidArgumentError
 if TYPE_CHECKING:
     from enumsol.decks.cards import DeckPlace
     from enumsol.decks.model import Deck, ElementBlock
+    from enumsol.decks.states import DeckState
     from enumsol.decks.steps import Coupling, NodalEquation, Spring, Transform
     from enumsol.fem.deck_options import DeckParts
     from enumsol.support.array_types import Integers
+
+#: Of a line between two nodes, other components below this share of the largest are rounding.
+_ALIGNED = 1e-6
 
 
 @dataclass(eq=False)
@@ -38,6 +42,8 @@ class DeckJoints:
         Nodes whose displacements are the rotation of a reference point (ROT NODE), and its name.
     rigid : set of str
         Reference points that turn.
+    grounds : list of (row, component, DeckPlace)
+        Nodes of no body at which springs end.
     """
 
     deck: Deck
@@ -47,6 +53,7 @@ class DeckJoints:
     points: dict[int, str] = field(default_factory=dict)
     turns: dict[int, str] = field(default_factory=dict)
     rigid: set[str] = field(default_factory=set)
+    grounds: list[tuple[int, int, DeckPlace]] = field(default_factory=list)
 
     def __post_init__(self) -> None:
         said = self.deck.analysis
@@ -112,8 +119,8 @@ class DeckJoints:
         needed = {1, 2, 3} if self.dimension == 3 else {1, 2}
         if given.kind == "kinematic" and not needed <= set(given.components):
             raise InvalidArgumentError(
-                f"{given.place}: *{given.card} couples the components {', '.join(map(str, given.components))}; expected "
-                f"all displacements, {min(needed)} to {max(needed)}"
+                f"{given.place}: *{given.card} couples the components {', '.join(map(str, given.components))}; "
+                f"expected all displacements, {min(needed)} to {max(needed)}"
             )
         row = int(self.deck.nodes_of(given.reference, given.place)[0])
         nodes, wanted = self._coupled(given)
@@ -164,6 +171,8 @@ class DeckJoints:
 
     def _equation(self, given: NodalEquation) -> None:
         deck = self.deck
+        if given.card == "MPC" and given.terms[0][1] > self.dimension:
+            return
         found = []
         for target, component, coefficient in given.terms:
             rows = deck.nodes_of(target, given.place)
@@ -171,7 +180,7 @@ class DeckJoints:
         count = max(len(rows) for rows, _, _ in found)
         if any(len(rows) not in (1, count) for rows, _, _ in found):
             raise InvalidArgumentError(
-                f"{given.place}: *EQUATION has sets of different sizes; expected sets of the same size, or single nodes"
+                f"{given.place}: *{given.card} has sets of different sizes; expected sets of one size, or single nodes"
             )
         for k in range(count):
             terms = []
@@ -180,8 +189,8 @@ class DeckJoints:
                 slot = self.slot(row, component)
                 if component > self.dimension and (slot is None or slot[1] < 0):
                     raise InvalidArgumentError(
-                        f"{given.place}: *EQUATION has component {component} of node {deck.node_name(row)}; expected 1 "
-                        f"to {self.dimension}"
+                        f"{given.place}: *{given.card} has component {component} of node {deck.node_name(row)}; "
+                        f"expected 1 to {self.dimension}"
                     )
                 entry = component - 1 if slot is None else slot[1]
                 turns = ("rz",) if self.dimension == 2 else ("rx", "ry", "rz")
@@ -212,19 +221,55 @@ class DeckJoints:
             or max(components, default=1) > self.dimension
         ):
             raise InvalidArgumentError(
-                f"{given.place}: *SPRING of type {kind} has the components {', '.join(map(str, given.components)) or 'none'}"
-                f"; expected one component of {wanted or 'no'} nodes, from 1 to {self.dimension}"
+                f"{given.place}: *SPRING of type {kind} has the components "
+                f"{', '.join(map(str, given.components)) or 'none'}; expected one component of {wanted or 'no'} "
+                f"nodes, from 1 to {self.dimension}"
             )
-        springs = self.options.setdefault("node_spring", {})
         for nodes in block.nodes[own].tolist():
-            name = ":".join(self._node(row) for row in nodes)
             value: Any = given.stiffness
             if wanted:
-                value = [given.stiffness if component + 1 in components else 0.0 for component in range(self.dimension)]
-            if name in springs and isinstance(springs[name], list) == isinstance(value, list):
-                value = (np.array(springs[name]) + value).tolist()
-            elif name in springs:
+                value = [given.stiffness if k + 1 in components else 0.0 for k in range(self.dimension)]
+            inside = [row for row in nodes if len(self.parts.in_bodies(np.array([row])))]
+            if 0 < len(inside) < len(nodes):
+                value = self._to_ground(given, inside[0], next(row for row in nodes if row not in inside), value)
+            elif not inside:
+                raise InvalidArgumentError(f"{given.place}: *SPRING holds no node of a body; expected one")
+            self._spring(given, ":".join(self._node(row) for row in inside), value)
+
+    def _to_ground(self, given: Spring, row: int, end: int, value: Any) -> list[float]:
+        """Stiffnesses of a spring to a node of no body, which has to be held: along an axis."""
+        if not isinstance(value, list):
+            along = np.abs(self.deck.points[end] - self.deck.points[row])
+            if np.sum(along > _ALIGNED * np.max(along)) != 1 or np.argmax(along) >= self.dimension:
                 raise InvalidArgumentError(
-                    f"{given.place}: *SPRING puts springs of two kinds between the same nodes; expected one kind"
+                    f"{given.place}: *SPRING joins node {self.deck.node_name(row)} to node {self.deck.node_name(end)}, "
+                    "which belongs to no body, in a direction between the axes; expected one along an axis"
                 )
-            springs[name] = value
+            value = [value if k == np.argmax(along) else 0.0 for k in range(self.dimension)]
+        self.grounds += [(end, k + 1, given.place) for k, own in enumerate(value) if own]
+        return list(value)
+
+    def check_grounds(self, state: DeckState) -> None:
+        """Refuse springs to nodes of no body that are not held.
+
+        Raises
+        ------
+        InvalidArgumentError
+            One is free or moves.
+        """
+        for row, component, place in self.grounds:
+            if state.values.get(("BOUNDARY", row, component)) != 0.0:
+                raise InvalidArgumentError(
+                    f"{place}: *SPRING ends at node {self.deck.node_name(row)}, which belongs to no body and is not "
+                    f"held in component {component}; expected it held at 0"
+                )
+
+    def _spring(self, given: Spring, name: str, value: Any) -> None:
+        springs = self.options.setdefault("node_spring", {})
+        if name in springs and isinstance(springs[name], list) == isinstance(value, list):
+            value = (np.array(springs[name]) + value).tolist()
+        elif name in springs:
+            raise InvalidArgumentError(
+                f"{given.place}: *SPRING puts springs of two kinds between the same nodes; expected one kind"
+            )
+        springs[name] = value

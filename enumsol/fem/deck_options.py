@@ -221,7 +221,6 @@ def _contacts(deck: Deck) -> dict[str, Any]:
     said = deck.analysis
     if not said.pairs:
         raise InvalidArgumentError(f"{deck.path} has no *CONTACT PAIR; expected contact")
-    pairs = []
     for pair in said.pairs:
         for name in (pair.slave, pair.master):
             if name not in deck.surfaces:
@@ -234,12 +233,16 @@ def _contacts(deck: Deck) -> dict[str, Any]:
                 f"{pair.place}: *CONTACT PAIR names the interaction {pair.interaction or 'nothing'}; expected one of "
                 f"{', '.join(said.interactions) or 'none'}"
             )
-        if pair.tied or said.interactions[pair.interaction].tied:
-            continue
-        pairs.append((pair.slave, pair.master, *_gap(pair)))
+    pairs = [(pair.slave, pair.master, *_gap(pair)) for pair in touching(deck)]
     if not pairs:
         raise InvalidArgumentError(f"{said.pairs[0].place}: all surfaces of *CONTACT PAIR are tied; expected contact")
     return {"pairs": pairs}
+
+
+def touching(deck: Deck) -> list[ContactPair]:
+    """Pairs of surfaces that are not tied."""
+    said = deck.analysis
+    return [pair for pair in said.pairs if not (pair.tied or said.interactions[pair.interaction].tied)]
 
 
 def _gap(pair: ContactPair) -> list[Any]:
@@ -256,7 +259,7 @@ def friction(deck: Deck, step: int) -> dict[str, float]:
         A surface has two.
     """
     said, found = deck.analysis, dict[str, float]()
-    for pair in said.pairs:
+    for pair in touching(deck):
         value = said.interactions[pair.interaction].friction
         for own in said.steps[:step]:
             value = own.friction.get(pair.interaction, value)
@@ -282,6 +285,7 @@ def acting(deck: Deck, parts: DeckParts, state: DeckState, joints: DeckJoints) -
     if state.of("TEMPERATURE"):
         place = next(place for key, place in state.places.items() if key[0] == "TEMPERATURE")
         raise InvalidArgumentError(f"{place}: *TEMPERATURE is not read")
+    joints.check_grounds(state)
     bodies, points = _on_nodes(deck, parts, state, joints, "BOUNDARY")
     forces, loads = _on_nodes(deck, parts, state, joints, "CLOAD")
     d, turns = joints.dimension, joints.dimension * (joints.dimension - 1) // 2

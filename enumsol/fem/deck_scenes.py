@@ -146,7 +146,7 @@ class DeckModel:
         if moved is not None:
             self.mesh = moved
             scene = mesh_scene(moved, **options)
-        if any(piece.free_motions(scene.mesh.points, scene.hold) for piece in scene.pieces):
+        if any(piece.free_motions(scene.mesh.points, scene.hold) for piece in scene.moving):
             scene = mesh_scene(self.mesh, **options, max_rigid_displacement="auto")
         return scene
 
