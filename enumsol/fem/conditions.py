@@ -24,9 +24,6 @@ from enumsol.support.array_arguments import real_array, short_vector
 if TYPE_CHECKING:
     from typing import Literal
 
-    from skfem import DiscreteField
-    from skfem.assembly.form.form import FormExtraParams
-
     from enumsol.fem.bases import NodalBasis
     from enumsol.fem.meshes import PartedMesh
     from enumsol.support.array_types import ArrayLike, Floats, Integers, Mask
@@ -413,30 +410,22 @@ def body_force_of(mesh: PartedMesh, value: object, name: str) -> Floats:
 
 def part_forces(body: NodalBasis, mesh: PartedMesh, loads: object, pressures: object, slope: str = "") -> Floats:
     """Nodal forces (N, d) of tractions and of pressures, which push into the body, on parts."""
-    from skfem.helpers import dot  # as in nodal_basis
-
     total, dimension = np.zeros(mesh.points.shape), mesh.points.shape[1]
     for part, value in by_part(loads, f"load{slope}").items():
         traction = short_vector(value, f"load{slope} of {part}", dimension)
-
-        def along(v: DiscreteField, _: FormExtraParams, t: Floats = traction[:, None, None]) -> DiscreteField:
-            return dot(t, v)
-
-        total += body.on_part(mesh.part(part), part, along)
+        total += body.on_part(mesh.part(part), part, partial(_constant, traction[:, None, None]))
     for part, value in by_part(pressures, f"pressure{slope}").items():
         pressure = finite_number(value, f"pressure{slope} of {part}")
-
-        def inward(v: DiscreteField, w: FormExtraParams, p: float = pressure) -> DiscreteField:
-            return -p * dot(w.n, v)
-
-        total += body.on_part(mesh.part(part), part, inward)
+        total += body.on_part(mesh.part(part), part, partial(np.multiply, -pressure))
     return total
+
+
+def _constant(traction: Floats, _: Floats) -> Floats:
+    return traction
 
 
 def part_springs(body: NodalBasis, mesh: PartedMesh, springs: object) -> sp.csc_array:
     """Stiffness (dN, dN) of springs between parts and the ground, lumped at the nodes."""
-    from skfem.helpers import dot  # as above
-
     count, dimension = mesh.points.shape
     blocks = np.zeros((count, dimension, dimension))
     for part, value in by_part(springs, "spring").items():
@@ -448,10 +437,8 @@ def part_springs(body: NodalBasis, mesh: PartedMesh, springs: object) -> sp.csc_
         for k, axis in enumerate(np.eye(dimension)):
             across = tangential * axis[:, None, None]
 
-            def density(
-                v: DiscreteField, w: FormExtraParams, k: int = k, a: Floats = across, b: float = normal - tangential
-            ) -> DiscreteField:
-                return dot(a + b * w.n[k] * w.n, v)
+            def density(n: Floats, k: int = k, a: Floats = across, b: float = normal - tangential) -> Floats:
+                return np.asarray(a + b * n[k] * n)
 
             blocks[:, :, k] += body.on_part(mesh.part(part), part, density, lumped=True)
     shape = (count * dimension, count * dimension)

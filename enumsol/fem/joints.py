@@ -213,7 +213,7 @@ def _weights(body: NodalBasis, mesh: PartedMesh, parts: list[str]) -> Floats:
     total = np.zeros(len(mesh.points))
     for part in parts:
         if part in mesh.facets:
-            total += body.on_part(mesh.part(part), part, lambda v, _: v[0])[:, 0]
+            total += body.on_part(mesh.part(part), part, lambda _: 1.0)[:, 0]
         else:
             total[mesh.nodes(part)] += 1.0
     return total
@@ -301,9 +301,10 @@ def _settle(held: Supports, found: Joints) -> None:
     """Hold the components of nodes to which equations leave nothing free, as supports do."""
     if not found.equations:
         return
-    more = found.references.count - held.fixed.size
-    arrays = (np.pad(own.ravel(), (0, more)) for own in (held.fixed, held.values, held.slopes))
-    given = eliminated(*arrays, found.equations, named=found.references.named)  # type: ignore[arg-type]
+    more = np.zeros(found.references.count - held.fixed.size)
+    fixed = np.append(held.fixed, more > 0)
+    values, slopes = np.append(held.values, more), np.append(held.slopes, more)
+    given = eliminated(fixed, values, slopes, found.equations, named=found.references.named)
     lone = (np.diff(given.T.indptr) == 0)[: held.fixed.size].reshape(held.fixed.shape) & ~held.fixed
     for target, own in ((held.values, given.offset), (held.slopes, given.slope)):
         target[lone] = own[: held.fixed.size].reshape(held.fixed.shape)[lone]

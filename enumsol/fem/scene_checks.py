@@ -9,7 +9,6 @@ import scipy.sparse as sp
 
 from enumsol.decks.elements import element_type
 from enumsol.errors import InvalidArgumentError
-from enumsol.fem.assembly import outward_normal
 from enumsol.fem.bases import SIMPLICES, corners_of, place_of
 from enumsol.fem.bodies import holding
 from enumsol.fem.contacts import Group, faced
@@ -107,7 +106,7 @@ def refuse_walls(scene: Scene) -> None:
         others = boundary[~piece.nodes[boundary[:, 0]]]
         if not np.any(own):
             continue
-        outward = scene.body.on_part(others, "boundary", outward_normal)
+        outward = scene.body.on_part(others, "boundary", np.asarray)
         found, weights, gaps = faced(mesh.points, nodes[own], group.normals[own], others, outward, others[:0])
         touching = nodes[own][found][gaps == 0.0]
         for part in group.parts:
@@ -246,7 +245,7 @@ def _turning(scene: Scene) -> list[str]:
         pair = group.pair
         if pair is None or not np.any(loose & _nodes_of(mesh, group)):
             continue
-        outward = scene.body.on_part(mesh.part(pair.master), pair.master, outward_normal)
+        outward = scene.body.on_part(mesh.part(pair.master), pair.master, np.asarray)
         facing = unit_vectors(np.asarray(sp.csr_array(-rows).maximum(0) @ outward), "normals of the other side")
         apart = float(np.degrees(np.max(np.arccos(np.clip(-np.sum(facing * group.normals, axis=1), -1.0, 1.0)))))
         if apart > 10.0:  # degrees, of a pocket

@@ -12,14 +12,14 @@ import scipy.sparse as sp
 
 from enumsol.errors import InvalidArgumentError
 from enumsol.fem import bodies, conditions
-from enumsol.fem.bases import NodalBasis
+from enumsol.fem.bases import NodalBasis, isotropic
 from enumsol.fem.bodies import BodyPiece
 from enumsol.fem.conditions import FRICTION, Options
 from enumsol.fem.contacts import Contacts, Group
 from enumsol.fem.joints import Joints
 from enumsol.fem.meshes import PartedMesh, unit_vectors
 from enumsol.fem.restrained import Body, Supports, axes_of, problem_of
-from enumsol.model.cells import KINDS, boundary_facets, by_kind, facet_outlines
+from enumsol.model.cells import KINDS, boundary_facets, by_kind, facet_outlines, lines_along
 from enumsol.model.mass import consistent_mass
 from enumsol.model.mesh import BodyMesh
 from enumsol.model.problem import given_friction
@@ -185,7 +185,8 @@ class Scene:
             surface, more = outward(contacts.facets, mesh.cells), {"areas": contacts.areas}
         gaps, coefficients = self.gaps, self.coefficients
         modes, bound = self._rigid_modes()
-        stiffness = self.joints.padded(self.body.stiffness(*self.lame.T)) + self.springs
+        elastic = self.body.stiffness(isotropic(self.lame, self.body.components))
+        stiffness = sp.csc_array(self.joints.padded(elastic) + self.springs)
         forces, slope = (
             np.append(own, more) for own, more in ((self.forces, self.joints.forces), (self.slope, self.joints.slope))
         )
@@ -308,10 +309,7 @@ def _mesh(scene: Scene) -> list[str]:
 
 
 def _bodies(scene: Scene) -> list[str]:
-    mesh = scene.mesh
-    sizes = np.empty(len(mesh.cells))
-    for block in scene.body.blocks:
-        sizes[block.rows] = np.sum(block.basis.dx, axis=1)
+    mesh, sizes = scene.mesh, scene.body.sizes
 
     def size(rows: Integers) -> str:
         what = "area" if scene.dimension == 2 else "volume"
@@ -337,7 +335,7 @@ def _parts(scene: Scene) -> list[str]:
     lines = []
     for name, facets in scene.mesh.facets.items():
         try:
-            size = f"{what} {np.sum(plain.on_part(facets, name, lambda v, _: v[0], lumped=True)):.6g}"
+            size = f"{what} {np.sum(plain.on_part(facets, name, lambda _: 1.0)[:, 0]):.6g}"
         except InvalidArgumentError:
             size = "not on the boundary"
         lines.append(f"{name}: {counted(len(facets), 'facet')}, {size}; {', '.join(scene.uses(name)) or 'not used'}")
@@ -396,17 +394,16 @@ def _drawn(scene: Scene, units: tuple[str, str] | None = None) -> Figure:
     figure: Figure = new_figure(figsize=(8.0, 5.6))
     ax: Any = figure.add_subplot(**({"projection": "3d"} if d == 3 else {}))
     if d == 2:
-        for _, cells in by_kind(2, mesh.cells):
-            outlines = mesh.points[cells[:, KINDS[2, cells.shape[1]].outline]]
-            ax.add_collection(PolyCollection(list(outlines), facecolor=_BODY, edgecolor=_EDGE, linewidth=0.5))
+        outlines = mesh.points[facet_outlines(mesh.cells)]
+        ax.add_collection(PolyCollection(list(outlines), facecolor=_BODY, edgecolor=_EDGE, linewidth=0.5))
     else:
         faces = mesh.points[facet_outlines(boundary_facets(3, mesh.cells))]
         ax.add_collection3d(Poly3DCollection(list(faces), facecolor=_BODY, edgecolor=_EDGE, linewidth=0.3, alpha=0.25))
     for k, (name, facets) in enumerate(mesh.facets.items()):
         label = f"{name}: {', '.join(scene.uses(name)) or 'not used'}"
         if d == 2:
-            along = facets if facets.shape[1] == 2 else facets[:, [0, 2, 1]]
-            ax.add_collection(LineCollection(list(mesh.points[along]), color=f"C{k}", linewidth=3, label=label))
+            along = mesh.points[lines_along(facets)]
+            ax.add_collection(LineCollection(list(along), color=f"C{k}", linewidth=3, label=label))
         else:
             sides = list(mesh.points[facet_outlines(facets)])
             ax.add_collection3d(Poly3DCollection(sides, facecolor=f"C{k}", alpha=0.35, label=label))
@@ -440,7 +437,7 @@ def _edges(dimension: int, cells: Integers) -> Integers:
     if dimension == 3:
         outlines = facet_outlines(facets)
         return np.stack([outlines, np.roll(outlines, -1, axis=1)], axis=2).reshape(-1, 2)
-    along = facets if facets.shape[1] == 2 else facets[:, [0, 2, 1]]
+    along = lines_along(facets)
     return np.concatenate([along[:, k : k + 2] for k in range(along.shape[1] - 1)])
 
 
