@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from enumsol.decks.model import Deck, ElementBlock
     from enumsol.decks.states import DeckState
     from enumsol.decks.steps import Coupling, NodalEquation, Spring, Transform
-    from enumsol.fem.deck_options import DeckParts
+    from enumsol.fem.deck_parts import DeckParts
     from enumsol.support.array_types import Integers
 
 #: Of a line between two nodes, other components below this share of the largest are rounding.

@@ -17,7 +17,8 @@ from enumsol.decks.reading import described
 from enumsol.decks.states import states_of
 from enumsol.errors import InvalidArgumentError, InvalidProblemError
 from enumsol.fem.deck_joints import DeckJoints
-from enumsol.fem.deck_options import DeckParts, acting, friction, is_plane, shared
+from enumsol.fem.deck_options import acting, friction, is_plane, shared
+from enumsol.fem.deck_parts import DeckParts
 from enumsol.fem.mesh_problems import mesh_scene
 from enumsol.loading.steps import LoadStep
 from enumsol.model.restart import afresh

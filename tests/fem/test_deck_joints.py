@@ -83,7 +83,11 @@ def test_constraints_of_decks_are_those_that_they_describe(read, name):
     parts = {key: dict(value) for key, value in PARTS.items()}
     if options.pop("third", False):
         parts = {"third": True, "nodes": {"FAR": [15]}}
-        options |= {"young": {"UPPER": 100.0, "LOWER": 300.0, "THIRD": 100.0}, "poisson": {"UPPER": 0.3, "LOWER": 0.2, "THIRD": 0.3}, "density": {"UPPER": 2.0, "LOWER": 3.0, "THIRD": 2.0}}
+        options |= {
+            "young": {"UPPER": 100.0, "LOWER": 300.0, "THIRD": 100.0},
+            "poisson": {"UPPER": 0.3, "LOWER": 0.2, "THIRD": 0.3},
+            "density": {"UPPER": 2.0, "LOWER": 3.0, "THIRD": 2.0},
+        }
     assert_same(read(text).problem(), by_hand(parts, **options))
 
 
