@@ -56,6 +56,7 @@ from .errors import (
     OutputError as OutputError,
     TooLargeError as TooLargeError,
 )
+from .fem.deck_scenes import DeckModel as DeckModel, read_deck as read_deck
 from .fixed_points import (
     FixedPoint as FixedPoint,
     TrescaSolution as TrescaSolution,

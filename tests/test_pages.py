@@ -22,8 +22,13 @@ def page(name):
     return followed
 
 
-NAMES = ("branches", "collection", "command_line", "gallery", "histories", "results", "stability", "three_dimensions")
-branches, collection, command_line, gallery, histories, results, stability, three_dimensions = map(page, NAMES)
+NAMES = (
+    *("branches", "collection", "command_line", "from_a_deck", "gallery", "histories", "results", "stability"),
+    "three_dimensions",
+)
+branches, collection, command_line, from_a_deck, gallery, histories, results, stability, three_dimensions = map(
+    page, NAMES
+)
 tutorial = page("tutorial")
 
 
@@ -103,6 +108,16 @@ def test_three_dimensions(three_dimensions):
     assert (three_dimensions["folder"] / "block.vtu").stat().st_size > 1000
     pictures = {path.name for path in three_dimensions["folder"].glob("wedge*")}
     assert pictures == {"wedge.html", "wedge.pvd", *(f"wedge-{k}.vtu" for k in range(9))}
+
+
+def test_from_a_deck(from_a_deck):
+    shipped = ROOT / "tests" / "decks" / "block_on_base.inp"
+    assert (from_a_deck["folder"] / "model.inp").read_text(encoding="utf-8") == shipped.read_text(encoding="utf-8")
+    printed = [text for kind, text in blocks(DOCS / "from_a_deck.md") if kind == "text"]
+    assert [text for _, text in from_a_deck["outputs"]][0] == printed[1]
+    told = str(from_a_deck["model"]).splitlines()
+    assert all(line in told for line in printed[0].splitlines() if line != "...")
+    assert (from_a_deck["history"].complete, len(from_a_deck["roots"])) == (True, 1)
 
 
 def test_results(results):

@@ -12,19 +12,16 @@ from enumsol.arithmetic.balls import TINY, Ball
 from enumsol.checker.walk import NO_FORM, Located, TreeChecker
 from enumsol.condensation.data import exactly_at
 from enumsol.condensation.space_condensed import EnclosedSpace
-from enumsol.proof.leaves import Alone, BoxedRoot, Excluded
+from enumsol.proof.leaves import Alone, BoxedRoot, Excluded, OnlyReference
 from enumsol.proof.reading import RefusedError, data_of, rational_from, shown_alpha, units_from
 from enumsol.proof.records import DeclaredForm, Limits, Tree
 from enumsol.trusted.space.boxed_solution import Box, BoxedSolution, apart_in_boxes, is_inside, solution_in_box
 from enumsol.trusted.space.leaves import Open, SpaceRoot, distinct_roots, settle
-from enumsol.trusted.space.product_forms import Ellipsoid
 from enumsol.trusted.space.resultants import unbounded
 from enumsol.trusted.space.sector_rows import OPEN, STICK, is_sector_covering
 from enumsol.trusted.space.space_uniqueness import LooseSolution
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
-
     from enumsol.checker.walk import Test
     from enumsol.proof.records import EnclosureRecord, Record
     from enumsol.support.array_types import Codes
@@ -71,7 +68,7 @@ class SpaceChecker(TreeChecker[EnclosedSpace, "SpaceRoot | LooseSolution"]):
     # -- leaves ----------------------------------------------------------------------------------------------------
 
     def _limits(self, codes: Codes, kind: type[Record]) -> Limits:
-        components = len(self.system.g) if kind in (DeclaredForm, Alone) else 0
+        components = len(self.system.g) if kind in (DeclaredForm, Alone, OnlyReference) else 0
         return Limits(codes, self.tree, (), self.declared, components, self.problem.modes.r)
 
     def _without_bound(self) -> EnclosedSpace:
@@ -103,8 +100,7 @@ class SpaceChecker(TreeChecker[EnclosedSpace, "SpaceRoot | LooseSolution"]):
         form = self._form(said.by)
         if form is None:
             return NO_FORM
-        what = "ellipsoid does" if isinstance(form, Ellipsoid) else "multipliers and its form do"
-        return None if said.holds(form, codes) else f"its {what} not exclude it"
+        return None if said.holds(form, codes) else "its multipliers and its form do not exclude it"
 
     def _declare(self, record: list[Any]) -> None:
         super()._declare(record)
@@ -131,23 +127,8 @@ class SpaceChecker(TreeChecker[EnclosedSpace, "SpaceRoot | LooseSolution"]):
         return self._wrongly_said(found, said)
 
     def _in_box(self, codes: Codes, said: BoxedRoot) -> str | None:
-        """The only solution of a box, in which all roots of a leaf lie, or the ellipsoid of an assignment."""
-        if said.by is not None:
-            form = self._form(said.by)
-            return self._of_box(codes, said, form.is_in) if isinstance(form, Ellipsoid) else NO_FORM
+        """The only solution of a box, in which all roots of a leaf lie."""
         leaf = settle(self.system, codes)
-        bounds = None if leaf is None else (leaf.y, leaf.w)
-
-        def within(box: Box) -> bool:
-            if bounds is None:
-                return True
-            y, w = bounds
-            return y is not None and w is not None and is_inside(y, w, box)
-
-        return self._of_box(codes, said, within)
-
-    def _of_box(self, codes: Codes, said: BoxedRoot, within: Callable[[Box], bool]) -> str | None:
-        """The only solution of a box, of which ``within`` tells whether all roots of the leaf lie in it."""
         (mid, rad, rho), unit = said.box(len(self.system.g)), self.system.unit
         with np.errstate(over="ignore", invalid="ignore"):
             box = Box.of(self.system, mid / unit, rad / unit, rho / unit**2)
@@ -157,7 +138,7 @@ class SpaceChecker(TreeChecker[EnclosedSpace, "SpaceRoot | LooseSolution"]):
         found = self.known[key]
         if found is None:
             return "its box is not proven to hold one solution"
-        if not within(box):
+        if leaf is not None and (leaf.y is None or leaf.w is None or not is_inside(leaf.y, leaf.w, box)):
             return "its roots are not proven to lie in its box"
         self.boxed.append((codes, found))
         self._locate(codes, found)

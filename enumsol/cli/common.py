@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any, NoReturn, TypeVar
 
 import typer
 
+from enumsol.cli.decks import DECK, deck_named, is_deck, step_chosen
 from enumsol.cli.progress import Display
 from enumsol.cli.streams import is_quiet, say
 from enumsol.errors import EnumsolError, Interrupted, InvalidArgumentError, OutOfMemoryError, OutputError
@@ -31,7 +32,7 @@ GALLERY, COLLECTION = "gallery:", "collection:"
 #: Ending of files that describe a problem by a mesh and what acts on its parts.
 TOML = ".toml"
 #: Usual endings of files that meshio reads and that are no problems.
-MESHES = (".msh", ".vtu", ".vtk", ".inp", ".xdmf", ".med", ".bdf", ".mesh", ".e", ".exo")
+MESHES = (".msh", ".vtu", ".vtk", DECK, ".xdmf", ".med", ".bdf", ".mesh", ".e", ".exo")
 
 
 class ExitStatus(enum.IntEnum):
@@ -90,23 +91,29 @@ def title_of(problem: str, text: str | None = None) -> str:
     return text_of(found, "title")
 
 
-def scene_of(name: str) -> Scene | None:
-    """Scene of a TOML file: mesh, material, supports and loads; None for other problems, which are matrices.
+def scene_of(name: str, step: int | None = None) -> Scene | None:
+    """Scene of a TOML file or a deck: mesh, material, supports and loads; None for others, which are matrices.
 
     Raises
     ------
     InvalidProblemError, InvalidArgumentError
         It cannot be read.
     """
-    if name.startswith(GALLERY) or not name.endswith(TOML) or Path(name).is_dir():
+    if name.startswith((GALLERY, COLLECTION)) or Path(name).is_dir():
+        return None
+    if is_deck(name):
+        return deck_named(name).scene(step or step_chosen())
+    if not name.endswith(TOML):
         return None
     from enumsol.fem import read_mesh_scene  # numpy and scikit-fem: not for --help
 
     return read_mesh_scene(name)
 
 
-def load_problem(name: str) -> AnyProblem:
+def load_problem(name: str, step: int | None = None) -> AnyProblem:
     """The problem in a file or made of a mesh, or that of ``gallery:NAME`` or ``collection:NAME``; its notes are said.
+
+    Of a deck it is that of a step, by default of the one that --step names.
 
     Raises
     ------
@@ -114,13 +121,13 @@ def load_problem(name: str) -> AnyProblem:
         It cannot be read, or there is none of that name; the message gives names that are close.
     """
     with Display("reading the problem"):
-        problem = _any_problem(name)
+        problem = _any_problem(name, step)
     for text in problem.notes:
         note(text)
     return problem
 
 
-def _any_problem(name: str) -> AnyProblem:
+def _any_problem(name: str, step: int | None) -> AnyProblem:
     if name.startswith(COLLECTION):
         from enumsol import collection  # numpy and scipy: not for --help
 
@@ -134,6 +141,8 @@ def _any_problem(name: str) -> AnyProblem:
         from enumsol.fem import read_mesh_problem  # as above
 
         return read_mesh_problem(name)
+    if is_deck(name):
+        return deck_named(name).problem(step or step_chosen())
     if Path(name).suffix.lower() in MESHES and Path(name).exists() and not Path(name).is_dir():
         raise InvalidArgumentError(
             f"{name} is a mesh; expected a problem, which enumsol solve {name} --output FILE.npz or a {TOML} file makes"
@@ -159,7 +168,7 @@ def refuse_misspelt(name: str, meshes: bool = False) -> None:
     from enumsol import gallery  # as above
     from enumsol.io import SUFFIXES
 
-    endings = MESHES if meshes else SUFFIXES
+    endings = MESHES if meshes else (*SUFFIXES, DECK)
     try:
         beside = [
             file.name
@@ -187,6 +196,23 @@ def parse_alpha(text: str, option: str = "--alpha") -> Alpha:
     from enumsol.support.arguments import alpha_value  # numpy: not for --help
 
     return alpha_value(text, option)
+
+
+def alpha_of(text: str | None, name: str, problem: AnyProblem) -> Alpha:
+    """The alpha that was given, or any where the problem does not depend on it.
+
+    Raises
+    ------
+    InvalidArgumentError
+        There is none, and the problem depends on it.
+    """
+    if text is not None:
+        return parse_alpha(text)
+    if problem.depends_on_alpha:
+        raise InvalidArgumentError(
+            f"--alpha is missing, and friction or load of {name} depends on it; expected a number"
+        )
+    return 0.0
 
 
 def parse_interval(first: str, last: str) -> tuple[Alpha, Alpha]:

@@ -7,10 +7,9 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from enumsol.cli import output
-from enumsol.cli.common import ExitStatus, finish, in_units, load_problem, parse_alpha, so_far, units_of
+from enumsol.cli.common import ExitStatus, alpha_of, finish, in_units, load_problem, so_far, units_of
 from enumsol.cli.options import Count, Number, OutputFile, Problem, Quiet, Units
 from enumsol.cli.progress import Display
-from enumsol.errors import InvalidArgumentError
 
 if TYPE_CHECKING:
     from enumsol.fixed_points import FixedPoint, FixedPointProgress
@@ -57,7 +56,7 @@ def fixed_point(
     npz_file : Write all arrays, for FixedPoint.load.
     """
     body, names = load_problem(problem), units_of(problem, units)
-    value = _alpha(alpha, problem, body)
+    value = alpha_of(alpha, problem, body)
     options: dict[str, Any] = {"tolerance": tolerance, "max_iterations": max_iterations, "anderson": anderson}
     output.check_places(vtu_file, body, problem)
     found, ended = so_far(lambda: _approximate(body, value, start, options))
@@ -77,17 +76,6 @@ def fixed_point(
         frame=found.to_frame,
     )
     finish(ended, ExitStatus.DONE if found.converged else ExitStatus.INCOMPLETE)
-
-
-def _alpha(text: str | None, name: str, body: AnyProblem) -> Alpha:
-    """The alpha that was given, or any where the problem does not depend on it."""
-    if text is not None:
-        return parse_alpha(text)
-    if body.depends_on_alpha:
-        raise InvalidArgumentError(
-            f"--alpha is missing, and friction or load of {name} depends on it; expected a number"
-        )
-    return 0.0
 
 
 def _approximate(body: AnyProblem, alpha: Alpha, start: float | None, options: dict[str, Any]) -> FixedPoint:

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 import typer
 
 from enumsol.cli import common, output
+from enumsol.cli.decks import deck_named, is_deck
 from enumsol.cli.options import PLOT, Arithmetic, Count, OutputFile, PlotFile, Problem, Quiet, Seconds, Title, Units
 from enumsol.cli.progress import Display
 from enumsol.errors import InvalidArgumentError
@@ -60,7 +61,7 @@ def history(
     Parameters
     ----------
     steps : A CSV file with the columns alpha, friction or f0, f1, ...; or a list of alphas such as 0,1/2,1,0. Default:
-        the key steps of a .toml PROBLEM.
+        the key steps of a .toml PROBLEM, or those of a deck.
     arithmetic : verified: rigorous error bounds, with proof. fast: floats and a tolerance, never proven. exact:
         rationals throughout, for small problems in 2D.
     follow : Which roots of a step start the next one: all, the nearest, or all but those that run away.
@@ -77,7 +78,11 @@ def history(
     """
     if proof_file is not None and arithmetic != "verified":
         raise InvalidArgumentError(f"--proof is given with {arithmetic} arithmetic; expected verified")
-    given, names, body = _steps(problem, steps), common.units_of(problem, units), common.load_problem(problem)
+    if steps is None and is_deck(problem):
+        body, given = common.load_problem(problem, 1), deck_named(problem).steps()
+    else:
+        given, body = _steps(problem, steps), common.load_problem(problem)
+    names = common.units_of(problem, units)
     limits = {"max_branches": max_branches, "max_nodes": max_nodes, "time_limit": time_limit}
     options = {"arithmetic": arithmetic, "follow": follow, "merge": merge, "refine": refine, **limits}
     found, ended = common.so_far(lambda: _search(body, given, jobs, options))
@@ -87,7 +92,7 @@ def history(
     def write_page(path: str) -> None:
         from enumsol.report import write_report  # numpy: not for --help
 
-        write_report(found, path, title=common.title_of(problem, title), units=names, scene=common.scene_of(problem))
+        write_report(found, path, title=common.title_of(problem, title), units=names, scene=common.scene_of(problem, 1))
 
     output.deliver(
         (proof_file, lambda path: _write_proof(found, path)),

@@ -16,6 +16,7 @@ from typing import Annotated, Literal, Union, get_args, get_origin
 
 import typer
 
+from enumsol.cli.decks import DECK, with_decks
 from enumsol.cli.files import FileCommand
 from enumsol.cli.streams import set_quiet
 
@@ -24,7 +25,7 @@ LIMITS, OUTPUT, PLOT, STEPS = "Limits", "Output", "Plot", "Steps"
 
 #: Help of parameters of several commands, where a command's docstring has none of its own.
 _SHARED = {
-    "problem": "A file (.npz, .h5, .toml), a directory of MatrixMarket files, gallery:NAME or collection:NAME.",
+    "problem": "A file (.npz, .h5, .toml, .inp), a directory of MatrixMarket files, gallery:NAME or collection:NAME.",
     "first": "First alpha: a number or a fraction.",
     "last": "Last alpha: a number or a fraction.",
     "max_nodes": "Stop after N nodes of the tree.",
@@ -50,7 +51,7 @@ def problem_names(incomplete: str) -> list[str]:
     from enumsol.cli.common import COLLECTION, GALLERY, TOML
     from enumsol.io import SUFFIXES
 
-    kinds = (*SUFFIXES, TOML)
+    kinds = (*SUFFIXES, TOML, DECK)
     files = [name for name in sorted(glob(escape(incomplete) + "*")) if isdir(name) or name.endswith(kinds)]
     # a shell that takes the colon for the end of a word asks for what follows it
     names = [f"{GALLERY}{name}" for name in gallery.GALLERY]
@@ -82,7 +83,7 @@ Quantity = Annotated[Literal["lambda_n", "lambda_t", "u_n", "u_t"], typer.Option
 
 def add_command(app: typer.Typer, command: Callable[..., None], name: str | None = None) -> None:
     """Add a command, whose options are the parameters of a function and whose help is its docstring."""
-    parameters = options_of(command)
+    command, parameters = with_decks(command, options_of(command))
     # typer reads both
     command.__signature__ = signature(command).replace(parameters=parameters)  # type: ignore[attr-defined]
     command.__annotations__ = {option.name: option.annotation for option in parameters}

@@ -20,6 +20,7 @@ from typing import TYPE_CHECKING, Any
 
 import typer
 
+from enumsol.cli.decks import options_said
 from enumsol.cli.streams import is_quiet, pour, say
 from enumsol.errors import InvalidArgumentError, MissingDependencyError, OutputError
 from enumsol.support.files import write_file
@@ -137,7 +138,7 @@ def checking_commands(proven: bool, source: str | None, command: str, place: str
     """
     if not proven or source is None:
         return []
-    problem, file = shlex.quote(source), f"{command}.proof" if proof is None else shlex.quote(proof)
+    problem, file = shlex.quote(source) + options_said(), f"{command}.proof" if proof is None else shlex.quote(proof)
     verify = f"enumsol verify {problem} {file}"
     return [verify] if proof is not None else [f"enumsol {command} {problem} {place} --proof {file}", verify]
 

@@ -140,7 +140,9 @@ class Search:
 
 
 @options.with_options(*options.options_of(Search), after=2)
-def roots(problem: options.Problem, alpha: options.Number, *, quiet: options.Quiet = False, **chosen: Any) -> None:
+def roots(
+    problem: options.Problem, alpha: options.Number | None = None, *, quiet: options.Quiet = False, **chosen: Any
+) -> None:
     """Find all solutions of PROBLEM at one ALPHA.
 
     Prints a table of the roots and whether it is complete; lambda_n and lambda_t are nodal forces, not pressures. The
@@ -153,12 +155,15 @@ def roots(problem: options.Problem, alpha: options.Number, *, quiet: options.Qui
 
     Parameters
     ----------
-    alpha : Parameter value: a decimal number, read as float64, or a fraction such as 8/3, taken exactly.
+    alpha : Parameter value: a decimal number, read as float64, or a fraction such as 8/3, taken exactly; required if
+        friction or load depend on it.
     """
     search = Search(**chosen)
     search.check()
-    value = common.parse_alpha(alpha)
-    search.answer(problem, common.load_problem(problem), value, problem)
+    if alpha is not None:
+        common.parse_alpha(alpha)  # before the problem is read
+    body = common.load_problem(problem)
+    search.answer(problem, body, common.alpha_of(alpha, problem, body), problem)
 
 
 def _write_states(problem: AnyProblem, found: RootSet, path: str, option: str) -> None:

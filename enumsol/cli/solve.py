@@ -7,7 +7,8 @@ from typing import TYPE_CHECKING, Annotated, Any, NamedTuple
 
 import typer
 
-from enumsol.cli.common import GALLERY, TOML, note, parse_alpha, refuse_misspelt, units_of
+from enumsol.cli.common import GALLERY, TOML, note, parse_alpha, refuse_misspelt, scene_of, units_of
+from enumsol.cli.decks import is_deck
 from enumsol.cli.options import LIMITS, OUTPUT, Argument, OutputFile, OutputFlag, Quiet, options_of, with_options
 from enumsol.cli.output import deliver, write_figure
 from enumsol.cli.progress import Display
@@ -90,11 +91,6 @@ def _numbers(text: str, option: str) -> list[Any]:
     return [_entry(part, option, text) for part in text.split(",")]
 
 
-def _one_or_two(text: str, option: str) -> Any:
-    numbers = _numbers(text, option)
-    return numbers[0] if len(numbers) == 1 else numbers
-
-
 def _plane(text: str, option: str) -> str:
     if text not in ("strain", "stress"):
         raise InvalidArgumentError(f"{option} is {text}; expected strain or stress")
@@ -112,6 +108,33 @@ def _obstacle(text: str, option: str) -> dict[str, Any]:
     return _by_part([text], option, _numbers)
 
 
+def _parts(text: str, option: str) -> list[str]:
+    del option
+    return text.split(",")
+
+
+def _number_or_numbers(text: str, option: str) -> Any:
+    numbers = _numbers(text, option)
+    return numbers[0] if len(numbers) == 1 else numbers
+
+
+def _axes(text: str, option: str) -> dict[str, Any]:
+    kind, _, numbers = text.partition(":")
+    return {kind: _numbers(numbers, option)}
+
+
+def _equation(text: str, option: str) -> dict[str, Any]:
+    left, sign, right = text.partition("=")
+    terms = []
+    for term in left.split(","):
+        place, _, coefficient = term.strip().partition(":")
+        node, dot, component = place.rpartition(".")
+        if not dot:
+            raise InvalidArgumentError(f"{option} is {text}; expected NODE.x:NUMBER,NODE.y:NUMBER=NUMBER")
+        terms.append([node, component, _entry(coefficient, option, text)])
+    return {"terms": terms} | ({"value": _entry(right, option, text)} if sign else {})
+
+
 _PULL = "NAME=fx,fy[,fz]"
 #: By their names in `fem.mesh_problem`.
 MESH_OPTIONS = {
@@ -122,9 +145,9 @@ MESH_OPTIONS = {
     "plane": Given(_BODY, "[NAME=]strain|stress", _plane),
     "thickness": Given(_BODY, "[NAME=]LENGTH", _number),
     "density": Given(_BODY, "[NAME=]DENSITY", _number),
-    "friction": Given(_BODY, "[NAME=]F", _one_or_two),
-    "friction_slope": Given(_BODY, "[NAME=]F", _one_or_two),
-    "friction2": Given(_BODY, "[NAME=]F", _one_or_two),
+    "friction": Given(_BODY, "[NAME=]F", _number_or_numbers),
+    "friction_slope": Given(_BODY, "[NAME=]F", _number_or_numbers),
+    "friction2": Given(_BODY, "[NAME=]F", _number_or_numbers),
     "friction2_slope": Given(_BODY, "[NAME=]F", _number),
     "axis": Given(_BODY, "x,y,z", _numbers, False),
     "gap": Given(_BODY, "[NAME=]LENGTH", _number),
@@ -134,7 +157,14 @@ MESH_OPTIONS = {
     "symmetry": Given(_SUPPORT, "NAME", _as_given),
     "displacement": Given(_SUPPORT, "NAME=ux,uy[,uz]", _numbers),
     "displacement_slope": Given(_SUPPORT, "NAME=ux,uy[,uz]", _numbers),
+    "transform": Given(_SUPPORT, "NAME=KIND:NUMBERS", _axes),
+    "tie": Given(_SUPPORT, "NAME:NAME[:GAP]", _pair),
+    "reference": Given(_SUPPORT, "NAME=x,y[,z]", _numbers),
+    "rigid": Given(_SUPPORT, "NAME=PART[,PART]", _parts),
+    "coupling": Given(_SUPPORT, "NAME=PART[,PART]", _parts),
+    "equations": Given(_SUPPORT, "NODE.x:C,NODE.y:C[=VALUE]", _equation),
     "spring": Given(_SUPPORT, "NAME=kn,kt", _numbers),
+    "node_spring": Given(_SUPPORT, "NAME[:NAME]=kx,ky[,kz]", _number_or_numbers),
     "max_rigid_displacement": Given(_SUPPORT, "LENGTH|auto", _auto_or_number, False),
     "load": Given(_LOAD, _PULL, _numbers),
     "load_slope": Given(_LOAD, _PULL, _numbers),
@@ -144,6 +174,8 @@ MESH_OPTIONS = {
     "body_force_slope": Given(_LOAD, "[NAME=]fx,fy[,fz]", _numbers),
     "force": Given(_LOAD, _PULL, _numbers),
     "force_slope": Given(_LOAD, _PULL, _numbers),
+    "moment": Given(_LOAD, "NAME=M[,My,Mz]", _number_or_numbers),
+    "moment_slope": Given(_LOAD, "NAME=M[,My,Mz]", _number_or_numbers),
 }
 
 
@@ -179,7 +211,8 @@ def solve(
     """Build a contact problem from MESH and find all its solutions.
 
     A .toml file holds the same options under the same names (`load_slope`, not `--load-slope`), and `mesh`. All other
-    commands accept such files as PROBLEM, and also the files that --output writes. Without --alpha, a problem that
+    commands accept such files as PROBLEM, and also the files that --output writes. So they do decks of CalculiX and
+    Abaqus with materials, contact and steps (.inp), which need no options here either. Without --alpha, a problem that
     depends on alpha is written but not solved. With --dry-run, what was understood is printed.
 
     Exit status: as enumsol roots.
@@ -208,7 +241,14 @@ def solve(
     symmetry : Part on a plane of symmetry, or on rollers.
     displacement : Prescribed displacements; `free` for a component that is not prescribed.
     displacement_slope : The same, times alpha.
+    transform : Axes of nodes: rectangular:ax,ay (in 3D ax,ay,az,bx,by,bz), cylindrical:x,y (in 3D two points).
+    tie : Parts that are joined, first the one whose nodes follow the facets of the other; may be repeated.
+    reference : A reference point, for rigid, coupling, force, moment, clamp, displacement and node-spring.
+    rigid : Parts that move as a rigid body with a reference point.
+    coupling : Parts over which force and moment of a reference point are distributed.
+    equations : A linear equation between displacements, such as tip.x:1,7.x:-1=0.01; may be repeated.
     spring : Springs per area, along the normal and along the tangents.
+    node_spring : Springs at each node, or between two nodes (also one stiffness, along the line between them).
     max_rigid_displacement : Let bodies that only contact holds move as a whole, by at most this length; auto: 10 times
         the mesh's size.
     load : Force per area (in 2D per length and unit thickness).
@@ -219,6 +259,8 @@ def solve(
     body_force_slope : The same, times alpha.
     force : Force on each node of a part or set of nodes, in 2D of the whole thickness.
     force_slope : The same, times alpha.
+    moment : Moment on a reference point.
+    moment_slope : The same, times alpha.
     alpha : Parameter value: a number, or a fraction such as 8/3; required if friction or load depend on it.
     output : Write the problem for the other commands: .npz, .h5, or a new directory.
     dry_run : Print what was understood: bodies, parts, loads, contact nodes, rigid modes. Nothing is solved.
@@ -254,12 +296,12 @@ def solve(
         if output is not None:
             return
         raise InvalidArgumentError("--alpha is missing, on which friction or load depend; expected it, or --output")
-    source = output if output is not None else mesh if mesh.endswith(TOML) else None
+    source = output if output is not None else mesh if mesh.endswith(TOML) or (is_deck(mesh) and not given) else None
     search.answer(mesh, problem, value or 0.0, source, scene)
 
 
 def _scene(mesh: str, options: dict[str, Any]) -> Scene:
-    """Scene that the mesh and the options, or a TOML file, describe."""
+    """Scene that the mesh and the options, or a TOML file or a deck, describe."""
     from enumsol import fem  # numpy: not for --help
     from enumsol.fem.conditions import refuse_old_friction
     from enumsol.fem.mesh_problems import check_keys
@@ -272,7 +314,9 @@ def _scene(mesh: str, options: dict[str, Any]) -> Scene:
             flag = _flags(next(iter(options)))[0]
             raise InvalidArgumentError(f"{flag} is given beside {mesh}, which has all options; expected it there")
         refuse_misspelt(mesh)
-        return fem.read_mesh_scene(mesh)
+    whole = scene_of(mesh) if mesh.endswith(TOML) or (is_deck(mesh) and not options) else None
+    if whole is not None:
+        return whole
     place = file_path(mesh, "MESH", "the name of a mesh file")
     if place.suffix in SUFFIXES or mesh.startswith(GALLERY):
         raise InvalidArgumentError(f"{mesh} is a problem; expected a mesh (enumsol roots {mesh} solves a problem)")

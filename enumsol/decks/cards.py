@@ -19,7 +19,7 @@ from enumsol.errors import InvalidArgumentError
 from enumsol.support.array_types import Floats, Integers, NDArray
 from enumsol.support.deadlines import look, tell
 from enumsol.support.files import unreadable
-from enumsol.support.messages import shortened, visible
+from enumsol.support.messages import counted, shortened, visible
 
 #: Bytes of all files of a deck together: larger ones need several times as much memory when they are read.
 MOST_BYTES = 1_000_000_000
@@ -143,7 +143,7 @@ class Card:
         entries = self.entries(row)
         if len(entries) < least or (most is not None and len(entries) > most):
             expected = f"{least}" if most == least else f"{least} to {most}" if most is not None else f"{least} or more"
-            raise self.refused(f"has {len(entries)} numbers in a line; expected {expected}", row)
+            raise self.refused(f"has {counted(len(entries), 'number')} in a line; expected {expected}", row)
         return [self.number(entry, row) for entry in entries]
 
     def table(self, columns: int) -> Floats:
@@ -185,7 +185,7 @@ class Card:
                 stop = min(int(np.searchsorted(ends, lacking[0])), len(lines) - 1)
                 count = int(ends[stop] - (ends[row - 1] if row else 0))
                 expected = f"expected {width}, its own and those of its nodes"
-                raise self.refused(f"has {count} numbers for one element; {expected}", row)
+                raise self.refused(f"has {counted(count, 'number')} for one element; {expected}", row)
         values = _numbers_of(lines, int)
         if values is None:
             every = [self.integer(entry.strip(), row) for row, text in enumerate(lines) for entry in text.split(",")]

@@ -147,7 +147,7 @@ _OTHERS = {
 }  # fmt: skip
 #: Letters behind the number of nodes change the formulation: reduced integration, incompatible modes, hybrid, modified,
 #: with pressure or temperature as unknowns, and others.
-_LETTERS = re.compile(r"([A-Z][A-Z0-9]*?D|[A-Z]+)(\d+)([RIHMSLPTW]*)(?<!5)5?\Z")
+_LETTERS = re.compile(r"([A-Z][A-Z0-9]*?D|[A-Z]+)(\d+)(R5|[RIHMSLPTW]*)\Z")
 
 
 @lru_cache(maxsize=256)
@@ -161,9 +161,9 @@ def element_type(name: str) -> ElementType | None:
     >>> kind.family, kind.shape.nodes, kind.plain
     ('solid', 20, 'C3D20')
     """
-    if (other := _OTHERS.get(name) or _OTHERS.get(name.rstrip("RHS"))) is not None:
-        family, dimension, nodes = other
-        return ElementType(name, family, _SHAPES[dimension, nodes], name)
+    if (plain := name if name in _OTHERS else name.rstrip("RHS")) in _OTHERS:
+        family, dimension, nodes = _OTHERS[plain]
+        return ElementType(name, family, _SHAPES[dimension, nodes], plain)
     found = _LETTERS.match(name)
     if found is None or found.group(1) not in _FAMILIES:
         return None

@@ -8,6 +8,7 @@ from enumsol.decks.cards import Card
 from enumsol.decks.model import Material, Orientation, Section
 from enumsol.decks.registry import Reading, card
 from enumsol.support.array_types import Floats
+from enumsol.support.messages import counted
 
 #: Constants of the kinds of *ELASTIC.
 _CONSTANTS = {"ISO": 2, "ORTHO": 9, "ENGINEERING CONSTANTS": 9}
@@ -75,12 +76,12 @@ def _constants(given: Card, count: int) -> Floats:
     """Constants of a law that is given at one temperature, or at several where it is the same."""
     lines = -(-count // _WIDTH)
     if not given.data or len(given.data) % lines:
-        raise given.refused(f"has {len(given.data)} lines of data; expected {count} numbers")
+        raise given.refused(f"has {counted(len(given.data), 'line')} of data; expected {count} numbers")
     tables = []
     for first in range(0, len(given.data), lines):
         entries = [value for row in range(first, first + lines) for value in given.numbers(row)]
         if not count <= len(entries) <= count + 1:
-            raise given.refused(f"has {len(entries)} numbers; expected {count}, and a temperature", first)
+            raise given.refused(f"has {counted(len(entries), 'number')}; expected {count}, and a temperature", first)
         tables.append(entries[:count])
     if np.any(np.array(tables) != tables[0]):
         raise given.refused(

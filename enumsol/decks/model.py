@@ -15,6 +15,7 @@ import numpy as np
 
 from enumsol.decks.cards import DeckPlace, is_number, key
 from enumsol.decks.elements import ElementType
+from enumsol.decks.steps import Analysis
 from enumsol.errors import InvalidArgumentError
 from enumsol.support.array_types import Floats, Integers
 from enumsol.support.messages import listed
@@ -262,6 +263,8 @@ class Deck:
     orientations : dict of keys to Orientation
     instances : dict of keys ("" for the deck itself) to (first row of nodes, behind the last, first row of elements,
         behind the last)
+    analysis : Analysis
+        Steps, contacts and constraints.
     account : list of Account
     """
 
@@ -278,6 +281,7 @@ class Deck:
     sections: list[Section] = field(default_factory=list)
     orientations: dict[str, Orientation] = field(default_factory=dict)
     instances: dict[str, tuple[int, int, int, int]] = field(default_factory=dict)
+    analysis: Analysis = field(default_factory=Analysis)
     account: list[Account] = field(default_factory=list)
 
     @cached_property

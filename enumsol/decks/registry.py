@@ -11,6 +11,7 @@ from dataclasses import dataclass, field
 
 from enumsol.decks.cards import Card
 from enumsol.decks.model import Account, Deck, DeckRegion, Material
+from enumsol.decks.steps import Analysis
 
 #: Function that puts a card into the description, and returns what became of it in words; None for no words.
 Reader = Callable[["Reading", Card], str | None]
@@ -48,6 +49,11 @@ class Reading:
     part: str = ""
     instance: str = ""
     material: Material | None = None
+
+    @property
+    def analysis(self) -> Analysis:
+        """Description that cards of steps, contacts and constraints are put into."""
+        return self.deck.analysis
 
     @property
     def region(self) -> DeckRegion:

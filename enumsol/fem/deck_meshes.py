@@ -17,6 +17,8 @@ if TYPE_CHECKING:
 
 #: Sections whose elements carry something.
 _CARRYING = ("SOLID SECTION", "SHELL SECTION", "MEMBRANE SECTION", "BEAM SECTION")
+#: Elements without a section that are left out wherever they lie: lines of meshes, and what has cards of its own.
+_LEFT_OUT = ("trusses", "beams", "springs", "dashpots", "gap elements", "couplings", "point masses")
 #: What meshio writes at the top of its decks, in which a type of elements stands for nothing but a shape.
 _WRITTEN_BY_SHAPE = "written by meshio"
 
@@ -168,7 +170,8 @@ def _check_carrier(deck: Deck, block: ElementBlock, first: int, dimension: int, 
                 f"line {section.place.line}); expected solid or plane elements only, or --ignore {kind.name} to do "
                 "without them"
             )
-    if kind.shape.dimension >= 2 and not (kind.shape.dimension < dimension and _carries_names(block, covered)):
+    lies_on_bodies = kind.shape.dimension < dimension and _carries_names(block, covered)
+    if not lies_on_bodies and (kind.shape.dimension >= 2 or kind.family not in _LEFT_OUT):
         lost = counted(int(np.sum(~np.all(covered[block.nodes], axis=1))), "element")
         raise InvalidArgumentError(
             f"{block.place}: elements of type {kind.name} are {kind.family}, {lost} of which lie on no face of a solid "

@@ -41,13 +41,12 @@ if TYPE_CHECKING:
     from enumsol.trusted.quadratic_forms import EnclosedForm
     from enumsol.trusted.reference import Reference
     from enumsol.trusted.space.pieces import AlphaPiece
-    from enumsol.trusted.space.product_forms import Ellipsoid
     from enumsol.trusted.space.sector_margins import SlipForm
     from enumsol.trusted.space.space_uniqueness import LeafReference
     from enumsol.trusted.uniqueness import ClosedSolution
 
     #: What multipliers bound.
-    Bounded = EnclosedSystem | EnclosedForm | EnclosedPiece | SlipForm | Ellipsoid | AlphaPiece
+    Bounded = EnclosedSystem | EnclosedForm | EnclosedPiece | SlipForm | AlphaPiece
 
 #: Last entry of a record that is to be tested in rational arithmetic.
 RATIONAL = "rational"
@@ -101,12 +100,10 @@ class Excluded(Record):
         if by == RATIONAL and not limits.tree & Tree.PLANE:
             raise RecordError("it cannot be tested in rational arithmetic")
         if len(entries) > 2 and by != RATIONAL:
-            form = limits.check_form(by)
+            limits.check_form(by)
         if not limits.in_space:
             return cls(*multipliers_from(entries[:2], ROW_KINDS * limits.p), by)
         rows, values = multipliers_from(entries[:2], None, ends=2 if limits.tree & Tree.PIECES else 1)
-        if by is not None and any(code != UNDECIDED for code in form.codes) and len(rows):
-            raise RecordError("it has multipliers beside those of a form of products")
         return cls([checked_row(row, limits.p) for row in rows], values, by)
 
     def holds(self, within: Bounded, codes: Codes, errors: float = 1.0) -> bool:
@@ -391,35 +388,27 @@ class Alone(ClosingRecord):
 
 
 @dataclass(frozen=True, eq=False)
-class BoxedRoot(ClosingRecord):
-    """All solutions lie in a box that holds one solution.
+class BoxedRoot(Solved):
+    """All solutions of a complete assignment lie in a box that holds one solution.
 
     Attributes
     ----------
     mid, rad, rho : centre and radius of the box, and its weights of displacements, read where they are needed
     enclosure : EnclosureRecord
-    by : int or None
-        All solutions below the assignment lie in the ellipsoid of the form declared so many before, which lies in the
-        box. Without it the assignment is complete.
     """
 
-    kind, sizes, trees = "l", (7, 8), Tree.SPACE
+    kind, sizes, trees = "l", (7,), Tree.SPACE
 
     mid: Any
     rad: Any
     rho: Any
     enclosure: EnclosureRecord
-    by: int | None = None
 
     @classmethod
     def of(cls, entries: list[Any], limits: Limits) -> BoxedRoot:
         """The box and the enclosure."""
-        mid, rad, rho, *enclosure = entries[:6]
-        if entries[6:]:
-            limits.check_form(entries[6])
-        else:
-            check_complete(limits.codes)
-        return cls(mid, rad, rho, EnclosureRecord(*enclosure), *entries[6:])
+        mid, rad, rho, *enclosure = entries
+        return cls(mid, rad, rho, EnclosureRecord(*enclosure))
 
     def box(self, size: int) -> tuple[Floats, Floats, Floats]:
         """Centre, radius and rho of the box; ValueError where they are no ``size`` numbers each."""
@@ -437,32 +426,40 @@ class OnlyReference(ClosingRecord):
     rows : list of rows on displacements that are equations
     products : list of (row, row, factor)
     enclosure : EnclosureRecord or None
+    turns : array or None
+        In 3D, theta with which no other root is left at all; then there are no rows.
     """
 
-    kind, sizes, trees = "o", (4, 7), Tree.FLOATING & Tree.POINTS
+    kind, sizes, trees = "o", (4, 5, 7), Tree.FLOATING & Tree.POINTS
 
     back: int
     rows: list[Any]
     products: list[tuple[Any, Any, float]]
     enclosure: EnclosureRecord | None = None
+    turns: Floats | None = None
 
     @classmethod
     def of(cls, entries: list[Any], limits: Limits) -> OnlyReference:
         """Numbers that fit the problem."""
         back, rows, products, *enclosure = entries
-        if enclosure and limits.in_space:
+        turns = None
+        if limits.in_space and len(enclosure) == 1:
+            turns = numbers_from(enclosure.pop(), limits.components - limits.p)
+        if len(enclosure) not in ((0,) if limits.in_space else (0, 3)):
             raise RecordError(cls.unfit.format(len(entries) + 1, 4))
         if type(back) is not int or not 0 < back <= len(limits.declared):
             raise RecordError("its form is not declared")
         if not all(isinstance(value, list) for value in (rows, products)):
             raise RecordError("its rows are not a list")
+        if turns is not None and (rows or products):
+            raise RecordError("it has rows beside theta")
         if not all(isinstance(product, list) and len(product) == 3 for product in products):
             raise RecordError("its products are not pairs of rows with a factor")
         factors = numbers_from([factor for *_, factor in products], len(products)).tolist()
         pairs = [tuple(cls._row(row, limits) for row in pair) for *pair, _ in products]
         said = [(one, other, factor) for (one, other), factor in zip(pairs, factors, strict=True)]
         equations = [cls._row(row, limits) for row in rows]
-        return cls(back, equations, said, EnclosureRecord(*enclosure) if enclosure else None)
+        return cls(back, equations, said, EnclosureRecord(*enclosure) if enclosure else None, turns)
 
     @staticmethod
     def _row(row: object, limits: Limits) -> Any:
@@ -475,13 +472,16 @@ class OnlyReference(ClosingRecord):
     def holds(self, known: Reference | LeafReference, codes: Codes, reach: Floats) -> bool:
         """True if no other root lies below the assignment than that of a form, a Reference or LeafReference.
 
-        ``reach``: within these bounds of the rigid displacement (theory, section 14.11).
+        ``reach``: within these bounds of the rigid displacement (theory, sections 14.11 and 14.15).
         """
+        if self.turns is not None:
+            return cast("LeafReference", known).is_sole(self.turns, reach)
         return known.is_only_root(codes, self.rows, self.products, reach)
 
     def entries(self) -> Iterable[Any]:
-        """Without an enclosure where there is none."""
-        return self.back, self.rows, [list(product) for product in self.products], *(self.enclosure or ())
+        """Without an enclosure, and theta, where there is none."""
+        turns = () if self.turns is None else (self.turns,)
+        return self.back, self.rows, [list(product) for product in self.products], *(self.enclosure or ()), *turns
 
 
 # -- trees -------------------------------------------------------------------------------------------------------------

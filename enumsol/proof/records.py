@@ -84,15 +84,13 @@ class Limits:
         """True for a body whose stiffness is positive definite."""
         return bool(self.tree & Tree.HELD)
 
-    def check_form(self, back: Any) -> DeclaredForm:
-        """The form that was declared so many before; RecordError unless there is one that serves the assignment."""
+    def check_form(self, back: Any) -> None:
+        """Raise RecordError unless a form that serves the assignment was declared so many before."""
         known = self.tree & (Tree.PLANE | Tree.SPACE) and type(back) is int and 1 <= back <= len(self.declared)
         if not known:
             raise RecordError("its form was not declared")
-        form: DeclaredForm = self.declared[-back]
-        if not form.serves(self.codes, in_space=self.in_space):
+        if not self.declared[-back].serves(self.codes):
             raise RecordError("its form was made for another assignment")
-        return form
 
 
 class Record:
@@ -213,11 +211,11 @@ class DeclaredForm(Record):
     ----------
     codes : of the assignment for which it is made, or of the leaf that holds the root
     numbers : array
-        For a body that is held, in 2D the four rows of its multipliers one after the other; in 3D those of
-        ``sector_margins.SlipForm`` over the whole tree, else those of ``product_forms.Ellipsoid``. For
-        other bodies those of ``trusted.reference.Reference`` or ``trusted.space.space_uniqueness.LeafReference``.
+        For a body that is held, in 2D the four rows of its multipliers one after the other, in 3D those of
+        ``sector_margins.SlipForm``, over the whole tree. For other bodies those of ``trusted.reference.Reference`` or
+        ``trusted.space.space_uniqueness.LeafReference``.
     more : array
-        In 2D the weight of the equations; of an ellipsoid a point near its centre; of a root balance and share.
+        In 2D the weight of the equations; of a root balance and share.
     enclosure : EnclosureRecord or None
         Of the root, in 3D.
     """
@@ -257,31 +255,24 @@ class DeclaredForm(Record):
                 return 4 * limits.p, 1
             selection_from(codes, limits.friction)
             return limits.p + 3 * sum(limits.friction), 2
-        if not (whole and limits.held) and not all(map(is_code_of_leaf, codes)):
+        if not (whole if limits.held else all(map(is_code_of_leaf, codes))):
             raise ValueError("it is about no assignment")
-        if not limits.held:
-            return limits.p + 2 * limits.components, 2
-        count = limits.p + limits.components if whole else len(numbers) if isinstance(numbers, list) else 0
-        return count, 0 if whole else limits.components
+        return (limits.p + limits.components, 0) if limits.held else (limits.p + 2 * limits.components, 2)
 
     def same(self, other: DeclaredForm) -> bool:
         """True if another record says the same."""
         pairs = (self.numbers, other.numbers), (self.more, other.more)
         return self.codes == other.codes and all(np.array_equal(*pair) for pair in pairs)
 
-    def serves(self, codes: Sequence[int], *, in_space: bool = False) -> bool:
+    def serves(self, codes: Sequence[int]) -> bool:
         """True if a partial assignment is part of the one that this form is made for."""
-        if in_space and any(code != UNDECIDED for code in self.codes):
-            from enumsol.trusted.space.product_forms import refines as is_below  # in 3D only
-
-            return is_below(tuple(codes), self.codes)
         return all(mine == UNDECIDED or refines(code, mine) for code, mine in zip(codes, self.codes, strict=True))
 
     @np.errstate(over="ignore", invalid="ignore")
     def form(self, system: EnclosedSystem) -> Any:
-        """The form of an assignment, its ellipsoid, or the form of a root; None where it is not proven to be definite.
+        """The form of an assignment, or of a root; None where it is not proven to be definite.
 
-        An EnclosedForm or Reference, in 3D a SlipForm (of the whole tree), Ellipsoid or LeafReference.
+        An EnclosedForm or Reference, in 3D a SlipForm (of the whole tree) or LeafReference.
 
         Raises
         ------
@@ -292,13 +283,10 @@ class DeclaredForm(Record):
             if not system.held:
                 return Reference.of(system, self.codes, self.numbers, *self.more.tolist())
             return EnclosedForm.of(system, self.codes, self.numbers.reshape(4, -1), float(self.more[0]))
-        from enumsol.trusted.space.product_forms import Ellipsoid  # in 3D only
-        from enumsol.trusted.space.sector_margins import SlipForm
+        from enumsol.trusted.space.sector_margins import SlipForm  # in 3D only
         from enumsol.trusted.space.space_uniqueness import LeafReference
 
         given = cast("EnclosedSpace", system)
         if not system.held:
             return LeafReference.of(given, self.codes, self.numbers, *self.more.tolist())
-        if all(code == UNDECIDED for code in self.codes):
-            return SlipForm.of(given, self.numbers)
-        return Ellipsoid.of(given, self.codes, self.more / given.unit, self.numbers)
+        return SlipForm.of(given, self.numbers)

@@ -57,10 +57,7 @@ class Reader:
 
     def form_over(self, codes: Codes) -> Any:
         """The form that was used last of those that serve a partial assignment in place of the energy."""
-        # in 3D those of the whole tree do, and others are ellipsoids
-        own = self._limits.codes if self._limits.in_space else None
-        used = reversed(self._used.items())
-        return next((form for said, form in used if said.serves(codes) and own in (None, said.codes)), None)
+        return next((form for said, form in reversed(self._used.items()) if said.serves(codes)), None)
 
     def bound(self, leaf: leaves.Excluded) -> Bound:
         """Bound that is said to exclude a partial assignment; ValueError where its form is not proven."""
@@ -176,7 +173,6 @@ class Replay:
             return False
         if isinstance(leaf, leaves.OnlyReference):
             return search.closed(item, None, again=True)
-        boxed = isinstance(leaf, leaves.BoxedRoot) and leaf.by is None
-        if isinstance(leaf, records.ClosingRecord) and not boxed:
+        if isinstance(leaf, records.ClosingRecord):
             return search.closed(item, search.relaxations.energy(item.codes), again=True)
-        return (boxed or isinstance(leaf, leaves.Solved)) and search.settled(item)
+        return isinstance(leaf, leaves.Solved) and search.settled(item)

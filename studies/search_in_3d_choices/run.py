@@ -27,7 +27,7 @@ Its children inherit it. It is made at the root of the tree, and anew wherever s
 what a node in contact does, two halvings of a sector) were made since the last one. These bounds are in floats.
 
 ``around`` has the gap that the best form leaves around a root that no leaf settles, however narrow (angle-14 of
-study ``search_in_3d`` on the weakest springs, F = 0.5; forms of products settle it): below its assignment of statuses,
+study ``search_in_3d`` on the weakest springs, F = 0.5): below its assignment of statuses,
 and in sectors around its directions of slip; with all products and with some kinds only: lambda_n^2 - |tau|^2
 ("discs"), and in sectors the products of slips, of forces, or of one of each, across both ends.
 

@@ -27,8 +27,8 @@ CHECKERS.append("enumsol.checker.stability_checker")
 IN_SPACE = {
     *("enumsol.checker.space_checker", "enumsol.condensation.space_condensed", "enumsol.model.sectors"),
     *inside("trusted.space", "resultants", "sector_margins", "sector_rows", "leaves", "boxed_solution"),
-    *inside("trusted.space", "product_forms", "natural_map", "krawczyk", "space_uniqueness", "turning"),
-    *inside("trusted.space", "leaf_conditions", "leaf_equations"),
+    *inside("trusted.space", "natural_map", "krawczyk", "space_uniqueness", "turning"),
+    *inside("trusted.space", "leaf_conditions", "leaf_equations", "confinement"),
 }
 #: The search: its rooms, and what it alone uses of rooms that it shares with the checkers.
 SEARCH = (
@@ -83,7 +83,6 @@ SHARED = {
     "trusted.space.boxed_solution": {
         *("Box", "BoxedSolution", "BoxProblem", "apart_in_boxes", "is_inside", "solution_in_box")
     },
-    "trusted.space.product_forms": {"CONE", "SIGNED", "Ellipsoid", "Frame", "refines"},
     "trusted.space.krawczyk": {"Contraction", "NaturalMap", "Step"},
     "trusted.space.solution_curve": None,
     "trusted.space.curve_chains": None,

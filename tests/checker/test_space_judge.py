@@ -31,7 +31,7 @@ COARSE = (
     "its root is not proven to be the only one in it",
     *("is not proven to be one from end to end", "it is not proven that all its solutions lie on its curve"),
     *("its roots are not proven to lie in its boxes", "its roots are not proven to be an arc through its box"),
-    *("it is not proven to hold no root", "its ellipsoid does not exclude it"),
+    *("it is not proven to hold no root",),
     *("its box is not proven to hold one solution", "its roots are not proven to lie in its box"),
     *("a place is not proven to be on its curve", "the box of a part of a curve is not proven to hold it"),
     *("the root that was declared is not proven to be the only one in it", "the root that was declared is not proven"),

@@ -1,4 +1,4 @@
-"""Forged leaves "l", forms of products and what refers to them in 3D: refused, or what they say is true."""
+"""Forged leaves "l" in 3D: refused, or what they say is true."""
 
 import functools
 
@@ -6,12 +6,11 @@ import numpy as np
 import pytest
 from complete import all_roots
 from effort import some
-from problems3d import degenerate_integers, from_compliance, soft_or_coupled
-from proof_tools import by_forms, copied, of_kind, proof_of, put, put_in_all, records_of, refused, replaced
-from trees import by_the_tree, products_at_once
+from problems3d import degenerate_integers
+from proof_tools import copied, of_kind, proof_of, put, put_in_all, records_of, refused, replaced
+from trees import by_the_tree
 
 from enumsol import verify
-from enumsol.model.sectors import SECTORS
 from enumsol.search.space.space_setup import SpaceSolvers
 
 _BOX, _BOX_RAD, _RHO, _MID, _RAD, _INDEX = range(1, 7)
@@ -128,101 +127,3 @@ def test_random_changes(part):
             away = np.abs(map_ @ (np.array(known[_MID]) - record[_BOX]))
             assert np.all(away <= record[_BOX_RAD] + np.abs(map_) @ known[_RAD])
     assert accepted < count
-
-
-# -- forms of products, and their leaves -------------------------------------------------------------------------------
-
-
-_CODES, _NUMBERS, _CENTRE = 1, 2, 3
-
-
-@functools.cache
-def proven_by_products():
-    """Problem and records of a proof with such leaves of both kinds."""
-    S, g, F = soft_or_coupled(8, 2)
-    problem = from_compliance(S, g, (F[:, 0], F[:, 1]))
-    with products_at_once():
-        return problem, records_of(all_roots(problem, 0).proof)
-
-
-def products(records):
-    """Places of the forms of products."""
-    return [k for k in of_kind(records, "q") if records[k][_CENTRE]]
-
-
-def boxes(records):
-    """Places of the boxes that hold an ellipsoid."""
-    return [k for k in of_kind(records, "l") if len(records[k]) == 8]
-
-
-def test_the_proof_has_all_of_them_and_is_accepted():
-    problem, records = proven_by_products()
-    assert len(of_kind(records, "q")) >= 2
-    assert boxes(records)
-    assert len(by_forms(records)) > 3
-    assert verify(problem, proof_of(records)).complete
-
-
-@pytest.mark.parametrize(
-    ("entry", "function"),
-    [
-        *((_NUMBERS, change) for change in (times(-1.0), times(0.0), times(1e300), shorter, longer, None)),
-        *((_CENTRE, change) for change in (shifted(10.0), shorter, "centre")),
-        *((_CODES, change) for change in (lambda codes: [6, *codes[1:]], times(0), times(1.0), shorter)),
-        (_CODES, lambda codes: [code + 4 if code > SECTORS else code for code in codes]),
-        (_CODES, lambda codes: [SECTORS + 1 if code > SECTORS else code for code in codes]),
-    ],
-)
-def test_changed_forms_are_refused(entry, function):
-    problem, records = proven_by_products()
-    assert refused(problem, put_in_all(records, products(records), entry, function))
-
-
-@pytest.mark.parametrize(
-    ("entry", "function"),
-    [
-        *((_BOX, shifted(1.0)), (_BOX_RAD, times(0.5)), (_BOX_RAD, times(1e6)), (_RHO, times(-1.0))),
-        *((_MID, shifted(1e-3)), (_RAD, times(0.0)), (_INDEX, lambda index: -index)),
-    ],
-)
-def test_changed_boxes_are_refused(entry, function):
-    problem, records = proven_by_products()
-    assert refused(problem, put_in_all(records, boxes(records), entry, function))
-
-
-def test_a_form_that_is_left_out_or_stands_elsewhere():
-    problem, records = proven_by_products()
-    forms = products(records)
-    # without any, and with the first one for all leaves
-    for missing in (forms, forms[1:]):
-        assert refused(problem, [record for k, record in enumerate(records) if k not in missing])
-
-
-def test_leaves_that_say_something_else():
-    """A leaf that holds a root is said to hold none; one of the energy is said to be one of a form."""
-    problem, records = proven_by_products()
-    first = of_kind(records, "q")[0]
-    for k in {*boxes(records), *of_kind(records, "x")} - {*by_forms(records)}:
-        # one of the energy may be one of a form, but not before any form was declared
-        assert refused(problem, replaced(records, k, ["x", [], "", 1])) or (records[k][0] == "x" and k > first)
-
-
-@pytest.mark.few(1, 2)
-@pytest.mark.parametrize("part", range(4))
-def test_random_changes_of_forms(part):
-    """What is accepted has the roots that there are."""
-    problem, records = proven_by_products()
-    rng, accepted = np.random.default_rng(part), 0
-    forms = products(records)
-    for _ in range(15):
-        changed = copied(records)
-        record = changed[forms[int(rng.integers(len(forms)))]]
-        entry = int(rng.integers(2, 4))
-        k = int(rng.integers(len(record[entry])))
-        record[entry][k] *= float(rng.choice([-1.0, 0.0, 0.5, 2.0, 1 + 1e-9]))
-        record[entry][k] += float(rng.choice([0.0, 1e-9, 1e-3, 1.0]))
-        report = verify(problem, proof_of(changed))
-        if report.ok:
-            accepted += 1
-            assert report.roots == records[-1]["roots"]
-    assert accepted < 15

@@ -292,7 +292,7 @@ def test_bad_problems_get_one_sentence(capsys, tmp_path, case):
         ("roots gallery:one-node-3d --alpha 0 --method exhaustive", "method is"),
         ("roots gallery:chain-2 --alpha 5 --method exhaustive --jobs 2", "expected 1 job"),
         ("roots gallery:clamped-block-16 --alpha 5 --method exhaustive --arithmetic fast", "hours"),
-        ("roots gallery:chain-2", "missing option '--alpha'"),
+        ("roots gallery:chain-2", "--alpha is missing"),
         ("roots --alpha 5", "missing argument 'PROBLEM'"),
         ("roots gallery:chain-2 --alfa 5", "no such option: --alfa; did you mean --alpha?"),
         ("follow gallery:chain-2 --alpha 5", "no such option: --alpha; expected some of --from, --to, --start"),

@@ -60,7 +60,7 @@ def test_what_was_found_is_printed_where_the_memory_does_not_suffice(capsys, mon
 
 @pytest.mark.parametrize("command", [["roots", "--alpha", "1"], ["graph", "--from", "0", "--to", "1"]])
 def test_a_lack_of_memory_is_told_in_one_sentence(capsys, monkeypatch, command):
-    def full(_):
+    def full(*_):
         raise MemoryError
 
     monkeypatch.setattr("enumsol.cli.common._any_problem", full)

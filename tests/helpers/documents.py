@@ -17,7 +17,9 @@ _BLOCK = re.compile(
     r"^```(\w+)\n((?:[^\n]*\n)*?)```$|^    (?:[^\n]* && )?((?:\.venv/bin/)?enumsol (?:[^\n]*\\\n)*[^\n]*)$",
     re.MULTILINE,
 )
-_FILE = re.compile(r"`([\w.]+\.toml)`")
+_FILE = re.compile(r"`([\w.]+\.(?:toml|inp))`")
+#: Languages of blocks that are files, by the last name before them.
+_OF_FILES = ("toml", "none")
 
 
 def blocks(path):
@@ -26,7 +28,7 @@ def blocks(path):
     for found in _BLOCK.finditer(text):
         if found[3] is not None:
             yield "command", found[3].removeprefix(".venv/bin/")
-        elif found[1] == "toml":
+        elif found[1] in _OF_FILES:
             # the last file that was named before
             yield found[1], (_FILE.findall(text[: found.start()])[-1], found[2])
         else:
@@ -49,7 +51,7 @@ def follow(path, folder, names=None):
         for kind, text in blocks(path):
             if kind == "python":
                 exec(compile(text, str(path), "exec"), names)
-            elif kind == "toml":
+            elif kind in _OF_FILES:
                 Path(text[0]).write_text(text[1], encoding="utf-8")
             elif kind == "command":
                 names["outputs"].append((text, _output(text)))

@@ -31,7 +31,6 @@ from space_judge_data import (
 )
 from space_judge_graph import Graph
 from space_judge_leaves import angles_of
-from space_judge_products import ProductForm
 from space_judge_references import RootForm, weights_of_balance
 from space_judge_zeros import explore, root_near, roots_of
 
@@ -128,11 +127,7 @@ class Point:
         """[6.1], [6.2] By the energy, or by a form."""
         terms = self.terms(codes, rows, text)
         if back is not None:
-            form = self.form_about(codes, back)
-            if isinstance(form, ProductForm):
-                need(not terms.rows and form.excludes(codes), "the form does not exclude the assignment")
-            else:
-                self.excluded(*margin(terms, *form))
+            self.excluded(*margin(terms, *self.form_at(back)))
             return
         self.excluded(*(floating_margin(terms) if self.system.rigid else margin(terms)))
 
@@ -157,23 +152,19 @@ class Point:
         )
 
     def declare(self, codes, numbers, more, *claim):
-        """[6.2] Forms, and forms of products; [6.7] roots."""
+        """[6.2] Forms; [6.7] roots."""
         if self.system.rigid:
             self.declared.append(self.declared_root(codes, numbers, more, *claim))
             return
         need(not claim, "an enclosure of no root")
-        if codes == [6] * self.p:
-            need(more == [], "a form has more numbers")
-            self.declared.append(self.plain_form(floats(numbers, self.system.m + self.p)))
-        else:
-            self.declared.append(self.product_form(codes, more, numbers))
+        need(codes == [6] * self.p, "a form about an assignment")
+        need(more == [], "a form has more numbers")
+        self.declared.append(self.plain_form(floats(numbers, self.system.m + self.p)))
 
-    def form_about(self, codes, back):
-        """[6.2] The form declared so many before, which has to be about the assignment."""
+    def form_at(self, back):
+        """[6.2] The form declared so many before."""
         need(not self.system.rigid and 1 <= integer(back) <= len(self.declared), "no form is declared")
-        form = self.declared[-back]
-        need(not isinstance(form, ProductForm) or form.serves(codes), "no form is about the assignment")
-        return form
+        return self.declared[-back]
 
     def declared_root(self, leaf, numbers, more, mid, rad, index):
         """[6.7] The root of a leaf, which counts, and its form."""
@@ -187,10 +178,14 @@ class Point:
         balance = weights_of_balance(self.data, self.scale, balance)
         return RootForm(self.system, Weights(self.system, numbers), root, leaf, balance, share)
 
-    def leaf_o(self, codes, back, rows, products):
+    def leaf_o(self, codes, back, rows, products, turns=None):
         """[6.7] No other root than the one that was declared so many before."""
         need(1 <= integer(back) <= len(self.declared), "no root is declared")
         form, (length, force) = self.declared[-back], self.scale
+        if turns is not None:
+            need(rows == products == [], "there are rows beside theta")
+            form.sole(floats(turns, self.system.m - self.p))
+            return
         need(isinstance(rows, list) and isinstance(products, list), "no lists of rows and products")
         places, factors = [], []
         for *pair, z in products:
@@ -224,25 +219,6 @@ class Point:
         H = (H + H.transpose()) / arb(2)
         need(is_definite(H), "a form is not positive definite")
         return H, (W * column(system.g0)).entries()
-
-    def product_form(self, codes, point, multipliers):
-        """[6.2] A form of products."""
-        need(isinstance(codes, list) and len(codes) == self.p and all(map(is_code, codes, self.tangents)), "no codes")
-        need(6 not in codes, "a form about an undecided node")
-        point = self.ball(point, [0.0] * self.system.m)[0]
-        length, force = ([arb(2) ** value for value in part] for part in self.scale)
-        return ProductForm(self.system, codes, point, floats(multipliers, len(multipliers)), force, length)
-
-    def in_ellipsoid(self, codes, back, box):
-        """[6.2], [6.6] All solutions of an assignment in a box that holds one, by their ellipsoid."""
-        form = self.form_about(codes, back)
-        need(isinstance(form, ProductForm), "the form is none of products")
-        rows, unit = self.system.S.tolist(), box.steps
-        for k, step in enumerate(unit):
-            row = [step * value for value in rows[k]]
-            row[k] += 1
-            off = form.bounds(form.about(row, -step * self.system.g0[k] - box.middle[k]))
-            need(form.is_empty or abs(off) <= box.radius[k], "the ellipsoid is not in the box")
 
     # -- complete assignments ------------------------------------------------------------------------------------------
 
@@ -324,13 +300,9 @@ class Point:
         else:
             self.roots.append(None)
 
-    def leaf_l(self, codes, centre, radius, rho, mid, rad, index, back=None):
-        """[6.6] All solutions of a complete assignment, or of an ellipsoid, in a box that holds one."""
+    def leaf_l(self, codes, centre, radius, rho, mid, rad, index):
+        """[6.6] All solutions of a complete assignment in a box that holds one."""
         box = Boxed(self, centre, radius, rho, mid, rad, index)
-        if back is not None:
-            self.in_ellipsoid(codes, back, box)
-            self.count(box)
-            return
         need(is_complete(codes), "the assignment is still open")
 
         def settled(angles, _, view):

@@ -1,7 +1,6 @@
-"""One solution by one certificate, one in a box and all in an ellipsoid, for space_judge, in balls of many digits.
+"""One solution by one certificate, and one in a box, for space_judge, in balls of many digits.
 
-Numbers in brackets are sections of docs/proof_format.md; the mathematics is in theory, sections 12.6, 12.7
-and 12.11.
+Numbers in brackets are sections of docs/proof_format.md; the mathematics is in theory, sections 12.6 and 12.7.
 """
 
 from flint import arb, arb_mat

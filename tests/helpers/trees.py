@@ -8,7 +8,7 @@ from enumsol.branches.enclosed.single_branches import ClosedPieces
 from enumsol.search import fathoming as closing
 from enumsol.search.fathoming import Closer
 from enumsol.search.reduction import WeightSource
-from enumsol.search.space import space_fathoming, space_setup
+from enumsol.search.space import space_setup
 from enumsol.search.space.open_leaves import KnownBoxes
 from enumsol.search.space.space_fathoming import SpaceCloser
 
@@ -66,12 +66,6 @@ def above_known_roots():
         return before(self, codes, relaxation)
 
     return _with((Closer, "whole", whole), (Closer, "closed", closed), (closing, "_FEW", 0))
-
-
-def products_at_once():
-    """In this context searches in 3D try forms of products at all assignments of final statuses, and nothing before."""
-    hard = (space_fathoming, "_HARD", 0), (space_fathoming, "_LONGEST", 0)
-    return _with((SpaceCloser, "whole", _nothing), (SpaceCloser, "_alone", _nothing), *hard)
 
 
 def forms_at_once():

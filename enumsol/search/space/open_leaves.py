@@ -12,8 +12,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from enumsol.arithmetic.balls import nearly_singular
+from enumsol.search.space.box_proposals import box_around
 from enumsol.search.space.curve_proposals import ERRORS
-from enumsol.search.space.product_search import box_around
 from enumsol.search.space.space_fathoming import NEAR, Point
 from enumsol.search.space.space_newton import Isotropic
 from enumsol.trusted.space.boxed_solution import BoxedSolution, is_inside, solution_in_box

@@ -15,7 +15,6 @@ import scipy.linalg
 from enumsol.model.sectors import SECTORS, nearest, start_of
 from enumsol.model.statuses import CONTACT, FRICTIONLESS, OPEN, SLIP_MINUS, SLIP_PLUS, STICK, UNDECIDED
 from enumsol.search.closing import TreeCloser
-from enumsol.search.space.product_search import ProductSearch
 from enumsol.search.space.space_newton import Isotropic
 from enumsol.support.deadlines import look
 from enumsol.trusted.space.space_uniqueness import equations, moderate_units
@@ -25,7 +24,6 @@ if TYPE_CHECKING:
 
     from enumsol.condensation.space_condensed import EnclosedSpace, SpaceSystem
     from enumsol.relaxation.engine import Relaxation
-    from enumsol.search.space.product_search import Branched, Enclosed, Missed
     from enumsol.support.array_types import Codes, Floats, Mask
 
 
@@ -33,9 +31,6 @@ if TYPE_CHECKING:
 NEAR = 1e-9
 #: Level of the sectors in which a regular solution is sought.
 _LEVEL = 20
-#: Assignments of final statuses that are met before forms of products are tried, which cost more than so many leaves;
-#: and that pass before the next try, at most.
-_HARD, _LONGEST = 256, 4096
 #: Smallest eigenvalue of Q relative to S for plain numbers below which there is no hope of better ones.
 _HOPELESS = -4.0
 #: Slack and smallest eigenvalue that fast arithmetic asks for.
@@ -65,9 +60,6 @@ class SpaceClosing(Protocol):
     def alone_in(self, codes: Codes, numbers: Floats, leaf: Codes) -> list[Any] | None:
         """The root of a leaf, as a list, if no other solution has the statuses of an assignment; None if not proven."""
 
-    def fathom(self, codes: Codes, tree: Sequence[Branched | Missed | Enclosed]) -> list[Any]:
-        """The solutions of boxes in a tree below an assignment that is proven already, which is written."""
-
 
 class SpaceCloser(TreeCloser):
     """Tries once before the tree, and then at every assignment that allows the statuses of a regular solution.
@@ -87,8 +79,6 @@ class SpaceCloser(TreeCloser):
         self._enough, self._least = (_CLEAR, _CLEAR) if regular else (1e-9, NEAR)
         #: Assignments of statuses that were tried in vain.
         self._tried: set[Codes] = set()
-        #: Assignments of final statuses that were met, and that pass before products are tried again.
-        self._met = self._wait = self._pause = 0
 
     def whole(self) -> list[Any] | None:
         """The only solution, as a list; None where that is not proven."""
@@ -97,40 +87,12 @@ class SpaceCloser(TreeCloser):
 
     def again(self, codes: Codes, relaxation: Relaxation | None) -> list[Any] | None:
         """The only solution, proven again where an earlier search has proven it."""
-        if all(code == UNDECIDED for code in codes):
-            return self.whole()
-        found = self._alone(codes)
-        return self._by_products(codes) if found is None else found
+        return self.whole() if all(code == UNDECIDED for code in codes) else self._alone(codes)
 
     def closed(self, codes: Codes, relaxation: Relaxation | None) -> list[Any] | None:
-        """The only solutions below an assignment, if that is proven.
-
-        That is the regular solution that is known, or what forms of products leave where many assignments of final
-        statuses were met.
-        """
+        """The regular solution that is known, if it is proven to be the only one below an assignment."""
         del relaxation
-        found = self._alone(codes)
-        if found is not None or self._regular or UNDECIDED in codes or CONTACT in codes:
-            return found
-        self._met += 1
-        if self._met <= _HARD:
-            return None
-        if self._wait > 0:
-            self._wait -= 1
-            return None
-        found = self._by_products(codes)
-        self._pause = 2 * self._pause + 1 if found is None else 0
-        self._wait = min(self._pause, _LONGEST)
-        return found
-
-    @cached_property
-    def _products(self) -> ProductSearch:
-        return ProductSearch(self._certifier.enclosed)
-
-    def _by_products(self, codes: Codes) -> list[Any] | None:
-        """Solutions that forms of products leave of an assignment, if these are in a few boxes with one each."""
-        tree = None if self._regular else self._products.closed(codes, programs=8)
-        return None if tree is None else self._certifier.fathom(codes, tree)
+        return self._alone(codes)
 
     def _alone(self, codes: Codes) -> list[Any] | None:
         """The regular solution that is known, if it is proven to be the only one with the statuses of an assignment.

@@ -38,12 +38,10 @@ from enumsol.relaxation.space_relaxation import SpaceEngine, SpaceRelaxation
 from enumsol.search.certifiers.protocol import WIDEN, Bound, Certifier, Refine, UndecidedPart
 from enumsol.search.outcome import HOLD
 from enumsol.search.space.open_leaves import Cause, KnownBoxes, obstacle, sector_to_halve
-from enumsol.search.space.product_search import Branched, Enclosed, Missed
 from enumsol.trusted.floating_bounds import motion_beside
 from enumsol.trusted.space.leaves import Open, SpaceRoot, settle
-from enumsol.trusted.space.product_forms import Ellipsoid, refines
 from enumsol.trusted.space.resultants import resultants, unbounded
-from enumsol.trusted.space.sector_rows import is_sector_covering
+from enumsol.trusted.space.sector_rows import is_sector_covering, is_within
 from enumsol.trusted.space.space_uniqueness import LeafReference, OnlySolution
 from enumsol.trusted.space.turning import turned_by
 
@@ -97,7 +95,7 @@ class SpaceSplitting:
 
     def holds(self, code: int, final: int) -> bool:
         """True if a status allows a final one."""
-        return code == UNDECIDED or refines((final,), (code,))
+        return code == UNDECIDED or is_within(final, code)
 
     def towards(self, codes: Codes, node: int, final: int) -> list[int]:
         """Codes of the node's children, in a sector the final one's and what is beside it."""
@@ -215,8 +213,6 @@ class SpaceCertifier(Certifier):
         """True if the relaxation's multipliers are proven to exclude the partial assignment."""
         if not relaxation.bound > PRUNE_MARGIN:
             return False
-        if isinstance(relaxation.form, Ellipsoid):
-            return self._missed(codes, relaxation.form)
         rows, values = self._multipliers(relaxation)
         if (form := relaxation.form) is None:
             found = self._exclusions.record(codes, rows, values, within=self.bounded)
@@ -275,47 +271,11 @@ class SpaceCertifier(Certifier):
             answer = self._verified[codes] = self._placed(codes, answer)
         return answer
 
-    def _in_box(self, codes: Codes, found: BoxedSolution, by: int | None = None) -> BoxedSolution:
+    def _in_box(self, codes: Codes, found: BoxedSolution) -> BoxedSolution:
         """The solution of a box, and its leaf written."""
         self._verified[codes], unit = found, self.enclosed.unit
         centre, radius, rho = found.box.numbers
-        self._leaf(BoxedRoot(centre * unit, radius * unit, rho * unit**2, self._ball(found, wider=_WIDER), by))
-        return found
-
-    def _missed(self, codes: Codes, ellipsoid: Ellipsoid) -> bool:
-        """True if an ellipsoid leaves no solution of an assignment, which is then written."""
-        if not refines(codes, ellipsoid.codes) or not ellipsoid.misses(codes):
-            return False
-        self._leaf(Excluded([], np.zeros(0), self._about(ellipsoid)))
-        return True
-
-    def _about(self, ellipsoid: Ellipsoid) -> int:
-        """How many forms ago that of an ellipsoid was declared."""
-        centre = ellipsoid.frame.centre * self.enclosed.unit
-        return self._back(ellipsoid, lambda: DeclaredForm(ellipsoid.codes, ellipsoid.numbers, centre))
-
-    def fathom(self, codes: Codes, tree: Sequence[Branched | Missed | Enclosed]) -> list[BoxedSolution]:
-        """The solutions of boxes in a tree below an assignment that is proven already, which is written.
-
-        Parameters
-        ----------
-        codes : of the assignment
-        tree : depth first
-        """
-        found: list[BoxedSolution] = []
-        stack = [codes]
-        for node in tree:
-            codes = stack.pop()
-            if isinstance(node, Branched):
-                self.branching(node.node, node.children)
-                after = codes[node.node + 1 :]
-                stack += [(*codes[: node.node], child, *after) for child in reversed(node.children)]
-                continue
-            by = self._about(node.ellipsoid)
-            if isinstance(node, Enclosed):
-                found.append(self._in_box(codes, node.found, by))
-            else:
-                self._leaf(Excluded([], np.zeros(0), by))
+        self._leaf(BoxedRoot(centre * unit, radius * unit, rho * unit**2, self._ball(found, wider=_WIDER)))
         return found
 
     def _placed(self, codes: Codes, root: SpaceRoot) -> SpaceRoot:
@@ -377,7 +337,7 @@ class SpaceCertifier(Certifier):
     def only_root(self, codes: Codes, reference: LeafReference, proposal: OnlyRoot) -> list[SpaceRoot] | None:
         """The root, as a list, unless it was declared before; None if it is not proven that no other one lies below."""
         exclusions, leaf, found = self._exclusions, reference.selection, list[SpaceRoot]()
-        record = OnlyReference(0, *proposal)
+        record = OnlyReference(0, proposal.rows, proposal.products, turns=proposal.turns)
         if not record.holds(reference, codes, exclusions.free.reach):
             if not record.holds(reference, codes, exclusions.system.reach):
                 return None

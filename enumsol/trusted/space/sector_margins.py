@@ -30,7 +30,7 @@ _HALF = Ball.exact(np.array(0.5))
 
 
 class Bounding(Protocol):
-    """A form, or a piece of alpha, that has bounds of its own: SlipForm, Ellipsoid and AlphaPiece."""
+    """A form, or a piece of alpha, that has bounds of its own: SlipForm and AlphaPiece."""
 
     def margin(self, codes: Sequence[int], rows: Sequence[Row], values: Floats, errors: float = 1.0) -> float:
         """See ``space_margin``."""

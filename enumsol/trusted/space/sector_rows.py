@@ -52,6 +52,16 @@ def is_sector_covering(code: int, children: Sequence[int], tangents: int) -> boo
     return [a for a, _ in spans] + [end] == [begin] + [b for _, b in spans]
 
 
+def is_within(code: int, over: int) -> bool:
+    """True if a status is allowed by another one, which is neither undecided nor narrower."""
+    if code == over:
+        return True
+    if over == CONTACT:
+        return code not in (OPEN, UNDECIDED)
+    both = over > sectors.SECTORS and code > sectors.SECTORS
+    return both and sectors.contains(over - sectors.SECTORS, code - sectors.SECTORS)
+
+
 @lru_cache(maxsize=_KEPT)
 def row_sign(code: int, row: Row) -> int:
     """What the multiplier of a row may be at a node of this code."""

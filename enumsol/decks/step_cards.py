@@ -1,0 +1,241 @@
+"""Cards of steps: what is held, moved, loaded and heated, and how that goes on over time."""
+
+from __future__ import annotations
+
+from itertools import pairwise
+from typing import TYPE_CHECKING
+
+from enumsol.decks.cards import is_number, key
+from enumsol.decks.registry import card
+from enumsol.decks.steps import Act, Amplitude, DeckStep
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+    from enumsol.decks.cards import Card
+    from enumsol.decks.registry import Reading
+
+#: Names of supports, and the components that they hold.
+SUPPORTS = {
+    "ENCASTRE": (1, 2, 3, 4, 5, 6),
+    "PINNED": (1, 2, 3),
+    "XSYMM": (1, 5, 6),
+    "YSYMM": (2, 4, 6),
+    "ZSYMM": (3, 4, 5),
+    "XASYMM": (2, 3, 4),
+    "YASYMM": (1, 3, 5),
+    "ZASYMM": (1, 2, 6),
+}
+#: Loads that are forces per volume along an axis.
+VOLUME = ("BX", "BY", "BZ")
+#: Options of cards of loads and displacements that make them something else.
+_OTHER = ("SUBMODEL", "USER", "MASS FLOW", "BASE NAME", "FIXED", "SECTOR", "FILE", "BSTEP", "TIME DELAY", "LOAD CASE")
+#: What each kind of act is.
+_WORDS = {"BOUNDARY": "displacements", "CLOAD": "forces", "DLOAD": "loads", "TEMPERATURE": "temperatures"}
+
+
+@card("STEP", "NAME", "NLGEOM", "INC", "PERTURBATION", "AMPLITUDE", "UNSYMM", "SOLVER", "CONVERT SDI", "EXTRAPOLATION")
+def step(reading: Reading, given: Card) -> str:
+    """*STEP: what follows belongs to a new step."""
+    if reading.analysis.steps and not reading.analysis.steps[-1].ended:
+        raise given.refused("begins before the step before it has ended; expected *END STEP")
+    if "PERTURBATION" in given.options:
+        raise given.refused("has PERTURBATION, the answer to small changes about a state; expected a static step")
+    large = "NLGEOM" in given.options and given.name_of("NLGEOM") != "NO"
+    if large and "NLGEOM" not in reading.ignore:
+        raise given.refused("has NLGEOM, large displacements; expected small ones, or NLGEOM among what is ignored")
+    reading.analysis.steps.append(
+        DeckStep(given.place, given.options.get("NAME", "") or f"step {len(reading.analysis.steps) + 1}")
+    )
+    return f"step {len(reading.analysis.steps)}" + ("; NLGEOM is ignored: displacements are small" if large else "")
+
+
+@card("END STEP")
+def end_step(reading: Reading, given: Card) -> None:
+    """*END STEP: what the step lacks is refused."""
+    own = _step(reading, given)
+    if not own.analysis:
+        raise given.refused(f"ends step {len(reading.analysis.steps)}, which has no *STATIC; expected a static step")
+    own.ended = True
+
+
+@card(
+    "STATIC",
+    "SOLVER",
+    "DIRECT",
+    "EXPLICIT",
+    "TIME RESET",
+    "TOTAL TIME AT START",
+    "STABILIZE",
+    "FACTOR",
+    "ALLSDTOL",
+    "CONTINUE",
+)
+def static(reading: Reading, given: Card) -> str:
+    """*STATIC: its time counts for amplitudes."""
+    own = _step(reading, given)
+    own.analysis = given.name
+    for row, entries in given.rows():
+        if row == 0 and len(entries) > 1:
+            own.period = given.number(entries[1], row) or 1.0
+        if own.period < 0:
+            raise given.refused(f"has the time {own.period:g}; expected a time > 0", row)
+    return f"a static step of time {own.period:g}; increments are not used, as all equilibria at its end are sought"
+
+
+@card("BOUNDARY", "OP", "AMPLITUDE", "TYPE", "REGION TYPE", *_OTHER)
+def boundary(reading: Reading, given: Card) -> str:
+    """*BOUNDARY: components of nodes that are held or moved."""
+    if (kind := given.name_of("TYPE")) not in ("", "DISPLACEMENT"):
+        raise given.refused(f"has TYPE={kind}; expected displacements")
+    acts = []
+    for row, entries in given.rows():
+        label = key(entries[1]) if len(entries) > 1 else ""
+        value = 0.0
+        if label in SUPPORTS:
+            what = SUPPORTS[label]
+        else:
+            what = _components(given, row, entries[1:3])
+            value = given.number(entries[3], row) if len(entries) > 3 else 0.0
+        acts.append(_act(given, row, entries, "", what, (value,)))
+    return _given(reading, given, "BOUNDARY", acts)
+
+
+def _components(given: Card, row: int, entries: list[str]) -> tuple[int, ...]:
+    """Components from one to another, or one of them."""
+    ends = [given.integer(entry, row) for entry in entries if entry]
+    if not ends or not 1 <= ends[0] <= ends[-1] <= 6:
+        raise given.refused(f"has the components {', '.join(map(str, ends)) or 'none'}; expected some from 1 to 6", row)
+    return tuple(range(ends[0], ends[-1] + 1))
+
+
+@card("CLOAD", "OP", "AMPLITUDE", "FOLLOWER", *_OTHER)
+def cload(reading: Reading, given: Card) -> str:
+    """*CLOAD: forces on nodes, and moments on reference nodes."""
+    _without_following(given)
+    acts = []
+    for row, entries in given.rows():
+        component = _components(given, row, entries[1:2])
+        acts.append(_act(given, row, entries, "", component, (_last(given, row, entries, 2),)))
+    return _given(reading, given, "CLOAD", acts)
+
+
+@card("DLOAD", "OP", "AMPLITUDE", "FOLLOWER", "CONSTANT RESULTANT", *_OTHER)
+@card("DSLOAD", "OP", "AMPLITUDE", "FOLLOWER", "CONSTANT RESULTANT", *_OTHER)
+def dload(reading: Reading, given: Card) -> str:
+    """*DLOAD and *DSLOAD: pressures on faces of elements or on surfaces, forces per volume and gravity."""
+    _without_following(given)
+    acts = []
+    for row, entries in given.rows():
+        label = key(entries[1]) if len(entries) > 1 else ""
+        of_face = label[:1] == "P" and (label[1:].isdigit() if given.name == "DLOAD" else label == "P")
+        if label == "GRAV" and given.name == "DLOAD":
+            values = tuple(given.number(entry, row) for entry in (*entries[2:6], "", "", "", "")[:4])
+            if not any(values[1:]):
+                raise given.refused("has GRAV without a direction; expected an acceleration and three numbers", row)
+        elif of_face or (label in VOLUME and given.name == "DLOAD"):
+            values = (_last(given, row, entries, 2),)
+        else:
+            expected = "P1, P2, ..., GRAV, BX, BY or BZ" if given.name == "DLOAD" else "P, a pressure"
+            raise given.refused(f"has the load {label or 'without a label'}; expected {expected}", row)
+        acts.append(_act(given, row, entries, label, (), values))
+    return _given(reading, given, "DLOAD", acts)
+
+
+@card("TEMPERATURE", "OP", "AMPLITUDE", *_OTHER)
+def temperature(reading: Reading, given: Card) -> str:
+    """*TEMPERATURE: temperatures of nodes at the end of the step."""
+    acts = [_act(given, row, entries, "", (), (_last(given, row, entries, 1),)) for row, entries in given.rows()]
+    return _given(reading, given, "TEMPERATURE", acts)
+
+
+@card("INITIAL CONDITIONS", "TYPE", *_OTHER)
+def initial_conditions(reading: Reading, given: Card) -> str:
+    """*INITIAL CONDITIONS: temperatures at which nothing is strained."""
+    if (kind := given.needed("TYPE")) != "TEMPERATURE":
+        raise given.refused(f"has TYPE={kind}; expected TEMPERATURE")
+    if reading.analysis.steps:
+        raise given.refused("stands behind a *STEP; expected it before the first one")
+    reading.analysis.initial.acts += [
+        _act(given, row, entries, "", (), (_last(given, row, entries, 1),)) for row, entries in given.rows()
+    ]
+    return "temperatures at which nothing is strained"
+
+
+@card("AMPLITUDE", "NAME", "TIME", "VALUE", "DEFINITION", "USER", "SHIFTX", "SHIFTY", "SMOOTH")
+def amplitude(reading: Reading, given: Card) -> str:
+    """*AMPLITUDE: factors over time, of which the one at the end of a step counts."""
+    name = given.needed("NAME")
+    if given.name_of("DEFINITION") not in ("", "TABULAR") or given.name_of("VALUE") not in ("", "RELATIVE"):
+        raise given.refused("is no table of factors; expected DEFINITION=TABULAR and VALUE=RELATIVE")
+    if given.options.keys() & {"USER", "SHIFTX", "SHIFTY"}:
+        raise given.refused("has USER, SHIFTX or SHIFTY; expected a plain table of times and factors")
+    numbers = [given.number(entry, row) for row, entries in given.rows() for entry in entries]
+    times, factors = numbers[::2], numbers[1::2]
+    if len(times) != len(factors) or not times or any(b < a for a, b in pairwise(times)):
+        raise given.refused("has no pairs of rising times and factors; expected time, factor, time, factor, ...")
+    total = given.name_of("TIME").replace(" ", "") == "TOTALTIME"
+    reading.analysis.amplitudes[name] = Amplitude(tuple(times), tuple(factors), total)
+    return f"factors of {'all steps' if total else 'a step'} up to time {times[-1]:g}, where it is {factors[-1]:g}"
+
+
+@card("CHANGE FRICTION", "INTERACTION")
+def change_friction(reading: Reading, given: Card) -> str:
+    """*CHANGE FRICTION: the *FRICTION after it is that of an interaction from this step on."""
+    name = given.needed("INTERACTION")
+    own = _step(reading, given)
+    if name not in reading.analysis.interactions:
+        raise given.refused(
+            f"names the interaction {name}; expected one of {', '.join(reading.analysis.interactions) or 'none'}"
+        )
+    own.friction[name] = reading.analysis.interactions[name].friction
+    reading.analysis.changing = name
+    return f"friction of {name} changes in step {len(reading.analysis.steps)}"
+
+
+def _act(
+    given: Card, row: int, entries: list[str], label: str, components: tuple[int, ...], values: tuple[float, ...]
+) -> Act:
+    """Act of one line."""
+    named = entries[0] if entries else ""
+    if not named:
+        raise given.refused("has a line without a node, an element or a set; expected one of them", row)
+    target = named if is_number(named) else key(named)
+    return Act(given.name, given.at(row), target, label, components, values, given.name_of("AMPLITUDE") or None)
+
+
+def _last(given: Card, row: int, entries: list[str], place: int) -> float:
+    """The value that a line has at a place, which must be there."""
+    if len(entries) <= place:
+        raise given.refused(f"has {len(entries)} entries in a line; expected {place + 1}", row)
+    return given.number(entries[place], row)
+
+
+def _without_following(given: Card) -> None:
+    if "FOLLOWER" in given.options and given.name_of("FOLLOWER") != "NO":
+        raise given.refused("has FOLLOWER; expected loads that keep their direction")
+
+
+def _step(reading: Reading, given: Card) -> DeckStep:
+    """The step that a card is in."""
+    if not reading.analysis.steps or reading.analysis.steps[-1].ended:
+        raise given.refused("stands outside of steps; expected it between *STEP and *END STEP")
+    return reading.analysis.steps[-1]
+
+
+def _given(reading: Reading, given: Card, kind: str, acts: list[Act]) -> str:
+    """Add what a card gives to its step, or displacements to the model before the first one."""
+    other = next((name for name in _OTHER if name in given.options), None)
+    if other is not None:
+        raise given.refused(f"has {other}; expected values in the card itself")
+    own = reading.analysis.initial if not reading.analysis.steps and kind == "BOUNDARY" else _step(reading, given)
+    anew = given.name_of("OP") == "NEW" and all(act.card != given.name for act in own.acts)  # the first one counts
+    if anew:
+        own.fresh.add(kind)
+    own.acts.extend(acts)
+    return f"{_WORDS[kind]} of {_some(act.target for act in acts)}" + (", in place of all before" if anew else "")
+
+
+def _some(names: Iterator[str]) -> str:
+    every = list(dict.fromkeys(names))
+    return ", ".join(every[:3]) + (f" and {len(every) - 3} more" if len(every) > 3 else "") or "nothing"

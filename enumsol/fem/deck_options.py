@@ -1,0 +1,335 @@
+"""Options of `mesh_problem` that a deck says, by parts of the mesh that are named for it.
+
+Whatever acts on nodes, faces or elements becomes a named part and an option of this name.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from enumsol.decks.model import Surface
+from enumsol.errors import InvalidArgumentError
+from enumsol.fem.mesh_files import mesh_of_deck
+
+if TYPE_CHECKING:
+    from enumsol.decks.cards import DeckPlace
+    from enumsol.decks.model import Deck, Section
+    from enumsol.decks.states import DeckState
+    from enumsol.decks.steps import ContactPair
+    from enumsol.fem.meshes import PartedMesh
+    from enumsol.support.array_types import Floats, Integers
+
+#: Families of plane elements, and what `mesh_problem` calls them.
+_PLANES = {"plane strain": "strain", "plane stress": "stress", "axisymmetric": "axisymmetric"}
+
+
+class DeckParts:
+    """Named parts of a deck: those that it has, and those on which something acts, which get names of their own."""
+
+    def __init__(self, deck: Deck) -> None:
+        self._deck = deck
+        self._names: dict[tuple[str, bytes], str] = {}
+        self._taken = {*deck.node_sets, *deck.element_sets, *deck.surfaces}
+
+    def nodes(self, rows: Integers, wanted: str) -> str:
+        """Name of a set of nodes, the one that is wanted if it has these."""
+        return self._named(self._deck.node_sets, np.unique(rows), wanted, lambda own: own)
+
+    def elements(self, rows: Integers, wanted: str) -> str:
+        """Name of a set of elements."""
+        return self._named(self._deck.element_sets, np.unique(rows), wanted, lambda own: own)
+
+    def faces(self, faces: Integers, wanted: str, place: DeckPlace) -> str:
+        """Name of a surface of faces (k, 2)."""
+        return self._named(
+            self._deck.surfaces,
+            np.unique(faces, axis=0),
+            wanted,
+            lambda own: Surface(place, own),
+            lambda own: own.faces,
+        )
+
+    def _named(self, sets: Any, rows: Integers, wanted: str, made: Any, of: Any = lambda own: own) -> str:
+        key = (str(id(sets)), rows.tobytes())
+        if key in self._names:
+            return self._names[key]
+        name = wanted
+        if not (name in sets and np.array_equal(np.sort(of(sets[name]), axis=0), rows)):
+            count = 1
+            while name in self._taken:
+                count += 1
+                name = f"{wanted} ({count})"
+            sets[name] = made(rows)
+            self._taken.add(name)
+        self._names[key] = name
+        return name
+
+    def in_bodies(self, rows: Integers) -> Integers:
+        """Nodes among these that belong to bodies."""
+        own = [block.nodes.ravel() for block in self._deck.blocks if block.type.is_body]
+        return rows[np.isin(rows, np.concatenate(own))] if own else rows[:0]
+
+    def mesh(self) -> PartedMesh:
+        """Mesh of the deck with all of these."""
+        return mesh_of_deck(self._deck)
+
+
+# -- the same in all steps -------------------------------------------------------------------------------------------
+
+
+def shared(deck: Deck, parts: DeckParts) -> dict[str, Any]:
+    """Options that are the same in all steps: materials, contacts.
+
+    Raises
+    ------
+    InvalidArgumentError
+        A material or a contact is not what is known here.
+    """
+    return {**_materials(deck, parts), **_contacts(deck)}
+
+
+def _materials(deck: Deck, parts: DeckParts) -> dict[str, Any]:
+    """Young's modulus, Poisson's ratio, density and thickness by sets of elements, and the plane."""
+    found: dict[str, dict[str, Any]] = {name: {} for name in ("young", "poisson", "density", "thickness")}
+    for section, rows in _sections(deck):
+        name = parts.elements(rows, section.elements)
+        material = deck.materials[section.material]
+        if material.elastic != "ISO":
+            kind = f"the law {material.elastic}" if material.elastic else "no *ELASTIC"
+            raise InvalidArgumentError(
+                f"{material.elastic_place or material.place}: *MATERIAL {material.name} has {kind}; expected an "
+                "isotropic elastic law"
+            )
+        found["young"][name], found["poisson"][name] = map(float, material.constants)
+        if material.density:
+            found["density"][name] = material.density
+        found["thickness"][name] = section.thickness or 1.0
+    options: dict[str, Any] = {name: found[name] for name in ("young", "poisson")}
+    if found["density"].keys() == found["young"].keys():
+        options["density"] = found["density"]
+    if set(found["thickness"].values()) != {1.0} and _is_plane(deck):
+        options["thickness"] = found["thickness"]
+    if _is_plane(deck):
+        options["plane"] = _planes(deck, parts)
+    return options
+
+
+def _sections(deck: Deck) -> list[tuple[Section, Integers]]:
+    """Sections of bodies with the rows of their elements."""
+    bodies = np.concatenate([np.full(len(block.labels), block.type.is_body) for block in deck.blocks])
+    found, without = [], bodies.copy()
+    for section in deck.sections:
+        rows = deck.elements_of(section.elements, section.place)
+        rows = rows[bodies[rows]]
+        if not len(rows):
+            continue
+        if section.kind != "SOLID SECTION":
+            raise InvalidArgumentError(
+                f"{section.place}: *{section.kind} is of solid elements; expected *SOLID SECTION"
+            )
+        if section.material not in deck.materials:
+            known = ", ".join(deck.materials) or "none"
+            raise InvalidArgumentError(
+                f"{section.place}: *SOLID SECTION names the material {section.material}; expected one of {known}"
+            )
+        if section.orientation:
+            raise InvalidArgumentError(
+                f"{section.place}: *SOLID SECTION has an ORIENTATION, which is not read; expected an isotropic material"
+            )
+        found.append((section, rows))
+        without[rows] = False
+    if np.any(without):
+        first = int(np.argmax(without))
+        raise InvalidArgumentError(
+            f"{deck.path}: element {deck.element_name(first)} and {int(np.sum(without)) - 1} others have no *SOLID "
+            "SECTION; expected a material for every element"
+        )
+    return found
+
+
+def _is_plane(deck: Deck) -> bool:
+    return any(block.type.family in _PLANES for block in deck.blocks)
+
+
+def _planes(deck: Deck, parts: DeckParts) -> Any:
+    """Plane of all cells, or of each by sets of elements."""
+    rows: dict[str, list[Integers]] = {}
+    first = 0
+    for block in deck.blocks:
+        own = np.arange(first, first := first + len(block.labels))
+        if block.type.family in _PLANES:
+            rows.setdefault(_PLANES[block.type.family], []).append(own)
+    if len(rows) == 1:
+        return next(iter(rows))
+    return {parts.elements(np.concatenate(own), f"plane {name}"): name for name, own in rows.items()}
+
+
+def _contacts(deck: Deck) -> dict[str, Any]:
+    """Pairs of surfaces that may touch."""
+    said = deck.analysis
+    if not said.pairs:
+        raise InvalidArgumentError(f"{deck.path} has no *CONTACT PAIR; expected contact")
+    pairs = []
+    for pair in said.pairs:
+        for name in (pair.slave, pair.master):
+            if name not in deck.surfaces:
+                raise InvalidArgumentError(
+                    f"{pair.place}: *CONTACT PAIR names {name}; expected a surface, one of "
+                    f"{', '.join(deck.surfaces) or 'none'}"
+                )
+        if pair.interaction not in said.interactions:
+            raise InvalidArgumentError(
+                f"{pair.place}: *CONTACT PAIR names the interaction {pair.interaction or 'nothing'}; expected one of "
+                f"{', '.join(said.interactions) or 'none'}"
+            )
+        if pair.tied or said.interactions[pair.interaction].tied:
+            raise InvalidArgumentError(f"{pair.place}: the surfaces of *CONTACT PAIR are tied, which is not read")
+        pairs.append((pair.slave, pair.master, *_gap(pair)))
+    others = ("TIE", said.ties), ("EQUATION", said.equations), ("SPRING", said.springs), ("TRANSFORM", said.transforms)
+    for card, each in others:
+        for own in each:
+            raise InvalidArgumentError(f"{own.place}: *{card} is not used here, and would change the answer")
+    for coupling in said.couplings:
+        raise InvalidArgumentError(f"{coupling.place}: *{coupling.card} is not used here, and would change the answer")
+    return {"pairs": pairs}
+
+
+def _gap(pair: ContactPair) -> list[Any]:
+    """The gap of a pair, where it is not that of the geometry."""
+    if pair.clearance is not None:
+        return [pair.clearance]
+    if pair.adjust is not None:
+        raise InvalidArgumentError(f"{pair.place}: ADJUST is not read")
+    return []
+
+
+def friction(deck: Deck, step: int) -> dict[str, float]:
+    """Coefficients of friction in a step, by surfaces.
+
+    Raises
+    ------
+    InvalidArgumentError
+        A surface has two.
+    """
+    said, found = deck.analysis, dict[str, float]()
+    for pair in said.pairs:
+        value = said.interactions[pair.interaction].friction
+        for own in said.steps[:step]:
+            value = own.friction.get(pair.interaction, value)
+        if found.setdefault(pair.slave, value) != value:
+            raise InvalidArgumentError(
+                f"{pair.place}: the surface {pair.slave} has friction {value:g} here and {found[pair.slave]:g} in "
+                "another pair; expected one coefficient for each first surface"
+            )
+    return found
+
+
+# -- what acts in a step ---------------------------------------------------------------------------------------------
+
+
+def acting(deck: Deck, parts: DeckParts, state: DeckState) -> dict[str, Any]:
+    """Options for what is given at the end of a step.
+
+    Raises
+    ------
+    InvalidArgumentError
+        It cannot be given to a body here.
+    """
+    if state.of("TEMPERATURE"):
+        place = next(place for key, place in state.places.items() if key[0] == "TEMPERATURE")
+        raise InvalidArgumentError(f"{place}: *TEMPERATURE is not read")
+    options = {
+        "displacement": _on_nodes(deck, parts, state, "BOUNDARY", free=None),
+        "force": _on_nodes(deck, parts, state, "CLOAD", free=0.0),
+        "pressure": _pressures(deck, parts, state),
+        "body_force": _volume_forces(deck, parts, state),
+    }
+    return {name: value for name, value in options.items() if value}
+
+
+def _on_nodes(deck: Deck, parts: DeckParts, state: DeckState, kind: str, free: float | None) -> dict[str, list[Any]]:
+    """Displacements or forces by sets of nodes: nodes for which the same lines give the same."""
+    dimension = 2 if _is_plane(deck) else 3
+    of_node: dict[int, dict[int, float]] = {}
+    by: dict[int, list[DeckPlace]] = {}
+    for (node, component), value in state.of(kind).items():
+        place = state.places[kind, node, component]
+        if int(component) > dimension:
+            if value:
+                what = "moves" if kind == "BOUNDARY" else "loads"
+                raise InvalidArgumentError(
+                    f"{place}: *{kind} {what} node {deck.node_name(int(node))} in component {component}; expected "
+                    f"components 1 to {dimension} of a node of a body"
+                )
+            continue
+        of_node.setdefault(int(node), {})[int(component)] = value
+        by.setdefault(int(node), []).append(place)
+    groups: dict[Any, list[int]] = {}
+    for node, given in of_node.items():
+        groups.setdefault((tuple(sorted(set(by[node]))), tuple(sorted(given.items()))), []).append(node)
+    found = {}
+    for (places, given), nodes in groups.items():
+        rows = parts.in_bodies(np.array(nodes))
+        if len(rows):
+            own = dict(given)
+            name = parts.nodes(rows, _wanted(deck, rows, f"{kind.lower()} of line {places[0].line}"))
+            found[name] = [own.get(k, free) for k in range(1, dimension + 1)]
+    return found
+
+
+def _wanted(deck: Deck, rows: Integers, otherwise: str) -> str:
+    """Name of a set of nodes that has just these, or another one."""
+    same = (
+        name
+        for name, own in deck.node_sets.items()
+        if len(own) == len(rows) and np.array_equal(np.sort(own), np.sort(rows))
+    )
+    return next(same, otherwise)
+
+
+def _pressures(deck: Deck, parts: DeckParts, state: DeckState) -> dict[str, float]:
+    """Pressures by surfaces."""
+    groups: dict[tuple[DeckPlace, float], list[tuple[int, int]]] = {}
+    for (element, label), value in state.of("DLOAD").items():
+        if str(label).startswith("P") and value:
+            face = int(str(label)[1:]) - 1
+            place = state.places["DLOAD", element, label]
+            groups.setdefault((place, value), []).append((int(element), face))
+    found = {}
+    for (place, value), faces in groups.items():
+        rows = np.array(faces, dtype=np.int64)
+        found[parts.faces(rows, f"pressure of line {place.line}", place)] = value
+    return found
+
+
+def _volume_forces(deck: Deck, parts: DeckParts, state: DeckState) -> dict[str, list[float]]:
+    """Forces per volume by sets of elements: gravity by the density of each material, and those that are given."""
+    dimension = 2 if _is_plane(deck) else 3
+    total: dict[int, Floats] = {}
+    for (target, direction), value in state.of("GRAV").items():
+        place = state.places["GRAV", target, direction]
+        wanted = deck.elements_of(str(target), place)
+        axis = np.array([float(part) for part in str(direction).split()])
+        for section, rows in _sections(deck):
+            density = deck.materials[section.material].density
+            own = np.intersect1d(rows, wanted)
+            if len(own) and density is None:
+                raise InvalidArgumentError(
+                    f"{place}: *DLOAD has GRAV on elements of {section.material}, which has no *DENSITY; expected one"
+                )
+            for row in own.tolist():
+                total[row] = total.get(row, np.zeros(3)) + value * (density or 0.0) * axis
+    for (element, label), value in state.of("DLOAD").items():
+        if str(label).startswith("B"):
+            total[int(element)] = total.get(int(element), np.zeros(3)) + value * np.eye(3)["XYZ".index(str(label)[1])]
+    groups: dict[tuple[float, ...], list[int]] = {}
+    for row, force in total.items():
+        groups.setdefault(tuple(force.tolist()), []).append(row)
+    found = {}
+    for vector, elements in groups.items():
+        if any(vector[dimension:]):
+            raise InvalidArgumentError(f"{deck.path}: a force per volume acts across the plane of plane elements")
+        found[parts.elements(np.array(elements), "volume force")] = list(vector[:dimension])
+    return found

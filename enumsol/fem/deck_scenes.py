@@ -1,0 +1,223 @@
+"""Decks of CalculiX and Abaqus as scenes: what their steps, contacts and materials say, as options of `mesh_problem`.
+
+Whatever acts on nodes, faces or elements becomes a named part of the mesh and an option of this name, so that decks,
+TOML files and calls of `mesh_problem` share one builder. The steps become the loads of a history.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Collection
+from dataclasses import dataclass, field
+from functools import cached_property
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from enumsol.decks.reading import described
+from enumsol.decks.states import states_of
+from enumsol.errors import InvalidArgumentError, InvalidProblemError
+from enumsol.fem.deck_options import DeckParts, acting, friction, shared
+from enumsol.fem.mesh_problems import mesh_scene
+from enumsol.loading.steps import LoadStep
+from enumsol.support.arguments import file_path, positive_integer
+from enumsol.support.messages import counted
+
+if TYPE_CHECKING:
+    import os
+
+    from enumsol.decks.model import Deck
+    from enumsol.decks.states import DeckState
+    from enumsol.fem.meshes import PartedMesh
+    from enumsol.fem.scenes import Scene
+    from enumsol.model.problem3d import AnyProblem
+
+
+def read_deck(path: str | os.PathLike[str], *, ignore: Collection[str] = ()) -> DeckModel:
+    """Model that a deck of CalculiX or Abaqus describes: a contact problem for every step, and a history of them.
+
+    ``print(read_deck("model.inp"))`` says what became of every card. Nothing of a deck is dropped without a word: a
+    card that is not used is named with its line, and one that would change the answer is refused, unless ``ignore``
+    names it.
+
+    Parameters
+    ----------
+    path : str or path-like
+        The deck (.inp). Files that it includes have to be in its folder or below.
+    ignore : collection of str
+        Cards, and types of elements, that are left out though they may change the answer, such as ``["PLASTIC"]``;
+        "NLGEOM" takes the displacements of all steps to be small.
+
+    Returns
+    -------
+    DeckModel
+
+    Raises
+    ------
+    InvalidProblemError
+        The deck cannot be read, or describes what cannot be solved here. The message has the file and the line.
+
+    Examples
+    --------
+    >>> import enumsol
+    >>> model = enumsol.read_deck("block_on_base.inp")  # doctest: +SKIP
+    >>> roots = enumsol.enumerate_roots(model.problem(step=1), 0)  # doctest: +SKIP
+    >>> history = enumsol.histories(model.problem(step=1), model.steps())  # doctest: +SKIP
+    """
+    place = file_path(path, "path")
+    try:
+        return DeckModel(described(place, ignore=ignore), tuple(ignore))
+    except InvalidArgumentError as error:
+        raise InvalidProblemError(str(error)) from error
+
+
+@dataclass(eq=False)
+class DeckModel:
+    """Model that a deck describes; ``print(model)`` says what became of its cards.
+
+    Attributes
+    ----------
+    deck : Deck
+        The plain description.
+    ignored : tuple of str
+        What was left out though it may change the answer.
+    """
+
+    deck: Deck
+    ignored: tuple[str, ...] = ()
+    _parts: DeckParts = field(init=False, repr=False)
+    _options: list[dict[str, Any]] = field(init=False, repr=False)
+    _scenes: dict[int, Scene] = field(init=False, repr=False, default_factory=dict)
+
+    def __post_init__(self) -> None:
+        states = self._states()
+        self._parts = DeckParts(self.deck)
+        common = shared(self.deck, self._parts)
+        self._options = [
+            {**common, **acting(self.deck, self._parts, state), "friction": friction(self.deck, number)}
+            for number, state in enumerate(states, 1)
+        ]
+
+    def _states(self) -> list[DeckState]:
+        steps = self.deck.analysis.steps
+        if not steps:
+            raise InvalidArgumentError(
+                f"{self.deck.path} has no *STEP; expected a deck with a step, or a bare mesh for enumsol solve, or "
+                "mesh_problem, with what acts on it as options"
+            )
+        if not steps[-1].ended:
+            raise InvalidArgumentError(f"{steps[-1].place}: *STEP has no *END STEP; expected it")
+        return states_of(self.deck)
+
+    @property
+    def step_count(self) -> int:
+        """Number of its steps."""
+        return len(self.deck.analysis.steps)
+
+    @cached_property
+    def mesh(self) -> PartedMesh:
+        """Mesh with the parts that the deck names, and those on which something acts."""
+        return self._parts.mesh()
+
+    def scene(self, step: int | None = None) -> Scene:
+        """Scene at the end of a step (from 1), reached from no load at once; of a deck with one step, that one.
+
+        Raises
+        ------
+        InvalidArgumentError
+            There are several steps, and none is named, or no such step.
+        InvalidProblemError
+            The deck describes no scene.
+        """
+        number = self._number(step)
+        if number not in self._scenes:
+            options = self._options[number - 1]
+            try:
+                scene = mesh_scene(self.mesh, **options)
+                if any(piece.free_motions(scene.mesh.points, scene.hold) for piece in scene.pieces):
+                    scene = mesh_scene(self.mesh, **options, max_rigid_displacement="auto")
+            except InvalidArgumentError as error:
+                raise InvalidProblemError(f"{self.deck.path}: {error}") from error
+            self._scenes[number] = scene
+        return self._scenes[number]
+
+    def problem(self, step: int | None = None) -> AnyProblem:
+        """Contact problem at the end of a step (from 1), reached from no load at once.
+
+        Raises
+        ------
+        InvalidArgumentError, InvalidProblemError
+            As `scene`, or the data of the problem are not admissible.
+        """
+        scene = self.scene(step)
+        try:
+            return scene.problem()
+        except (InvalidArgumentError, InvalidProblemError) as error:
+            raise InvalidProblemError(f"{self.deck.path}: {error}") from error
+
+    def steps(self) -> list[LoadStep]:
+        """Steps for `histories`, on the problem of any step.
+
+        Raises
+        ------
+        InvalidProblemError
+            A step changes more than loads, displacements of nodes without contact, and friction.
+        """
+        first = self.problem(1)
+        found = [LoadStep(load=first.f, friction=first.friction)]
+        for number in range(2, self.step_count + 1):
+            other = self.problem(number)
+            what = _differs(first, other)
+            if what is not None:
+                place = self.deck.analysis.steps[number - 1].place
+                raise InvalidProblemError(
+                    f"{place}: step {number} changes {what}; expected steps that change loads, friction and "
+                    f"displacements of nodes without contact (enumsol roots with --step {number} takes the step alone)"
+                )
+            found.append(LoadStep(load=other.f, friction=other.friction))
+        return found
+
+    def _number(self, step: int | None) -> int:
+        count = self.step_count
+        if step is None:
+            if count > 1:
+                raise InvalidArgumentError(
+                    f"{self.deck.path} has {count} steps; expected a history of them (enumsol history), or step, the "
+                    "number of the one whose load acts alone"
+                )
+            return 1
+        number = positive_integer(step, "step")
+        if number > count:
+            raise InvalidArgumentError(f"step is {number}; expected one of 1 to {count}, those of {self.deck.path}")
+        return number
+
+    def __str__(self) -> str:
+        return account_of(self.deck)
+
+    def __repr__(self) -> str:
+        return f"DeckModel of {self.deck.path} with {counted(self.step_count, 'step')}"
+
+
+def account_of(deck: Deck) -> str:
+    """Table of what became of the cards of a deck: of cards of one kind that became the same, with all lines."""
+    rows: dict[tuple[str, str, str], list[int]] = {}
+    for entry in deck.account:
+        rows.setdefault((entry.place.file, entry.card, entry.became), []).append(entry.place.line)
+    table = [(f"{file} {_lines(lines)}", f"*{card}", became) for (file, card, became), lines in rows.items()]
+    widths = [max((len(row[k]) for row in table), default=0) for k in (0, 1)]
+    return "\n".join(f"{place:{widths[0]}}  {card:{widths[1]}}  {became}" for place, card, became in table)
+
+
+def _lines(lines: list[int]) -> str:
+    some = ", ".join(map(str, lines[:3]))
+    return f"line{'s' if len(lines) > 1 else ''} {some}" + (f" and {len(lines) - 3} more" if len(lines) > 3 else "")
+
+
+def _differs(first: AnyProblem, other: AnyProblem) -> str | None:
+    """Data that two problems do not share but for load and friction, in words."""
+    if first.n != other.n or first.p != other.p:
+        return "what is held"
+    if (first.A != other.A).nnz:
+        return "what is held"
+    if np.any(first.gap != other.gap) or np.any(first.slip_offset != other.slip_offset):
+        return "the displacement of nodes that are in contact or faced by such"
+    return None

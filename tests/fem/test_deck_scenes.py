@@ -1,0 +1,234 @@
+"""Decks with one card more or less, against the same problem described by hand, and in one sentence where it cannot be."""
+# ruff: noqa: E501 (tables of decks)
+
+import numpy as np
+import pytest
+from small_decks import CONTACT, HELD, MATERIALS, MESH, PRESSED, assert_same, by_hand, deck, step
+
+import enumsol
+
+SIDE = {"SIDE": (0.0, None)}
+TOP = {"TOP": (None, -0.01)}
+DOWN = "*BOUNDARY\nTOP, 2, 2, -0.01\n"
+PUSH = "*DLOAD\n12, P2, 2.\n"
+
+
+@pytest.fixture
+def read(tmp_path):
+    def read(text, **options):
+        (tmp_path / "model.inp").write_text(text)
+        return enumsol.read_deck(tmp_path / "model.inp", **options)
+
+    return read
+
+
+#: Decks by what is special about them, with the options that describe the same.
+RIGHT = {
+    "plain": (deck(), {}),
+    "a support by one component after the other": (
+        deck(held="*BOUNDARY\nBOTTOM, 1\nBOTTOM, 2\nSIDE, 1, 1\n*BOUNDARY\nTOP, 2\n"), {}
+    ),
+    "supports by names": (deck(held="*BOUNDARY\nBOTTOM, ENCASTRE\nSIDE, XSYMM\nTOP, 2\n"), {}),
+    "supports by numbers of nodes": (deck(held="*BOUNDARY\n1, PINNED\n2, 1, 2\n3, 1, 3\n11, 1\n14, 1\nTOP, 2\n"), {}),
+    "a support of the third component in the plane": (deck(held=HELD + "*BOUNDARY\nALL, 3, 3\n"), {}),
+    "a displacement in the step only": (deck(held="*BOUNDARY\nBOTTOM, 1, 2\n", steps=step(
+        "*BOUNDARY\nSIDE, 1, 1, 0.\nTOP, 2, 2, -0.01\n" + PUSH)), {}),
+    "supports that begin anew": (deck(held="*BOUNDARY\nALL, 1, 2\n", steps=step(
+        "*BOUNDARY, OP=NEW\nBOTTOM, 1, 2\nSIDE, 1\nTOP, 2, 2, -0.01\n" + PUSH)), {}),
+    "supports to which others are added": (deck(held="*BOUNDARY\nBOTTOM, 1, 2\n", steps=step(
+        "*BOUNDARY, OP=MOD\nSIDE, 1\nTOP, 2, 2, -0.01\n" + PUSH)), {}),
+    "a force": (deck(steps=step(DOWN + "*CLOAD\n13, 1, -0.5\n")), {"pressure": None, "force": {"NODE": (-0.5, 0)}}),
+    "forces on a set that add up": (deck(steps=step(DOWN + "*CLOAD\nEDGE, 1, -0.5\n*CLOAD\n13, 1, -0.25\n16, 1, -0.25\n"),
+        mesh=MESH + "*NSET, NSET=EDGE\n13, 16\n"), {"pressure": None, "force": {"EDGE": (-0.75, 0)}}),
+    "pressure on a set of elements": (deck(mesh=MESH + "*ELSET, ELSET=LAST\n12\n", steps=step(DOWN + "*DLOAD\nLAST, P2, 2.\n")), {}),
+    "pressure on a surface": (deck(steps=step(DOWN + "*DSLOAD\nRIGHT, P, 2.\n")), {}),
+    "pressure on another surface": (deck(steps=step("*DSLOAD, OP=NEW\nABOVE, P, 3.\n"), held="*BOUNDARY\nBOTTOM, 1, 2\nSIDE, 1\n"),
+        {"displacement": SIDE, "pressure": {"ABOVE": 3.0}, "max_rigid_displacement": "auto"}),
+    "gravity": (deck(steps=step(DOWN + "*DLOAD\nUPPER, GRAV, 9.81, 0., -1., 0.\nLOWER, GRAV, 9.81, 0., -1.\n")),
+        {"pressure": None, "body_force": {"UPPER": (0, -2 * 9.81), "LOWER": (0, -3 * 9.81)}}),
+    "gravity of all": (deck(mesh=MESH + "*ELSET, ELSET=EVERY\nUPPER, LOWER\n", steps=step(DOWN + "*DLOAD\nEVERY, GRAV, 9.81, 1., 0., 0.\n")),
+        {"pressure": None, "body_force": {"UPPER": (2 * 9.81, 0), "LOWER": (3 * 9.81, 0)}}),
+    "forces per volume": (deck(steps=step(DOWN + "*DLOAD\nUPPER, BX, 0.5\nUPPER, BY, -0.25\n12, P2, 2.\n")), {"body_force": {"UPPER": (0.5, -0.25)}}),
+    "force per volume of an element": (deck(steps=step(DOWN + "*DLOAD\n12, BX, 0.5\n")), {"pressure": None, "body_force": {"LAST": (0.5, 0)}}),
+    "an amplitude": (deck(materials="*AMPLITUDE, NAME=RISE\n0., 0., 0.5, 0.5,\n2., 2.\n" + MATERIALS,
+        steps=step("*BOUNDARY\nTOP, 2, 2, -0.01\n*DLOAD, AMPLITUDE=RISE\n12, P2, 2.\n")), {}),
+    "an amplitude of a displacement over a longer step": (deck(materials=MATERIALS + "*AMPLITUDE, NAME=RISE\n0., 0., 4., 1.\n",
+        steps="*STEP\n*STATIC\n0.1, 2.\n*BOUNDARY, AMPLITUDE=RISE\nTOP, 2, 2, -0.02\n" + PUSH + "*END STEP\n"), {}),
+    "plane stress and a thickness": (deck(type="CPS4", materials=MATERIALS.replace("MATERIAL=SOFT\n*SOLID", "MATERIAL=SOFT\n0.5,\n*SOLID").replace("MATERIAL=HARD\n", "MATERIAL=HARD\n0.5\n")),
+        {"plane": "stress", "thickness": 0.5}),
+    "no friction": (deck(contact="*SURFACE INTERACTION, NAME=DRY\n*SURFACE BEHAVIOR, PRESSURE-OVERCLOSURE=HARD\n*CONTACT PAIR, INTERACTION=DRY\nUNDER, ON\n"), {"friction": 0.0}),
+    "friction with a stiffness of sticking": (deck(contact=CONTACT.replace("0.3\n", "0.25, 1E6\n").replace("*FRICTION", "*SURFACE BEHAVIOR, PRESSURE-OVERCLOSURE=EXPONENTIAL\n0.001, 10.\n*FRICTION")), {"friction": 0.25}),
+    "the pair the other way round": (deck(contact=CONTACT.replace("UNDER, ON", "ON, UNDER")), {"pairs": [("ON", "UNDER")]}),
+    "a clearance": (deck(contact=CONTACT + "*CLEARANCE, SLAVE=UNDER, MASTER=ON, VALUE=0.004\n"), {"pairs": [("UNDER", "ON", 0.004)]}),
+    "a press fit": (deck(contact=CONTACT + "*CLEARANCE, MASTER=ON, SLAVE=UNDER, VALUE=-0.004\n"), {"pairs": [("UNDER", "ON", -0.004)]}),
+    "contact of a surface of nodes": (deck(mesh=MESH + "*SURFACE, NAME=POINTS, TYPE=NODE\n11\n12\n13\n", contact=CONTACT.replace("UNDER", "POINTS")), {}),
+    "friction that changes in the step": (deck(steps=step("*CHANGE FRICTION, INTERACTION=DRY\n*FRICTION\n0.1\n" + DOWN + PUSH)), {"friction": 0.1}),
+    "friction that changes to none": (deck(steps=step("*CHANGE FRICTION, INTERACTION=DRY\n*FRICTION\n0.\n" + DOWN + PUSH)), {"friction": 0.0}),
+}  # fmt: skip
+PARTS = {
+    "nodes": {"EDGE": [8, 11], "NODE": [8], "POINTS": [6, 7, 8]},
+    "bodies": {"LAST": [3]},
+}
+
+
+@pytest.mark.parametrize("name", RIGHT)
+def test_decks_are_the_problems_that_they_describe(read, name):
+    text, options = RIGHT[name]
+    assert_same(read(text).problem(), by_hand(PARTS, **options))
+    lower = "\n".join(line if line.startswith("**") else line.lower() for line in text.splitlines())
+    assert_same(read(lower).problem(), by_hand(PARTS, **options))
+
+
+#: Decks that are refused, with words of the one sentence that says why.
+WRONG = {
+    "no contact": (deck(contact=""), r"model.inp has no \*CONTACT PAIR; expected contact"),
+    "no step": (deck(steps=""), r"model.inp has no \*STEP"),
+    "a step without an end": (deck(steps="*STEP\n*STATIC\n"), r"line \d+: \*STEP has no \*END STEP"),
+    "a step in a step": (deck(steps="*STEP\n*STATIC\n*STEP\n"), r"line \d+: \*STEP begins before the step before it"),
+    "a step of no kind": (deck(steps="*STEP\n*END STEP\n"), r"line \d+: \*END STEP ends step 1, which has no \*STATIC"),
+    "large displacements": (deck(steps=step(DOWN, ", NLGEOM")), r"line \d+: \*STEP has NLGEOM"),
+    "vibrations about a state": (deck(steps=step(DOWN, ", PERTURBATION")), r"line \d+: \*STEP has PERTURBATION"),
+    "dynamics": (deck(steps="*STEP\n*DYNAMIC\n1., 1.\n*END STEP\n"), r"line \d+: \*DYNAMIC"),
+    "plasticity": (deck(materials=MATERIALS.replace("*DENSITY\n2.", "*PLASTIC\n1., 0.")), r"line \d+: \*PLASTIC .*--ignore PLASTIC"),
+    "rubber": (deck(materials=MATERIALS.replace("*DENSITY\n2.", "*HYPERELASTIC, NEO HOOKE\n1., 0.1")), r"line \d+: \*HYPERELASTIC"),
+    "no such set": (deck(held="*BOUNDARY\nBOTOM, 1, 2\n"), r"line \d+: .*BOTOM"),
+    "no such component": (deck(held="*BOUNDARY\nBOTTOM, 0, 2\n"), r"line \d+: \*BOUNDARY has the components 0, 2"),
+    "a temperature as displacement": (deck(held="*BOUNDARY\nBOTTOM, 11, 11, 20.\n"), r"line \d+: \*BOUNDARY has the components 11"),
+    "a velocity": (deck(steps=step("*BOUNDARY, TYPE=VELOCITY\nTOP, 2, 2, 1.\n")), r"line \d+: \*BOUNDARY has TYPE=VELOCITY"),
+    "two displacements of one node": (deck(steps=step(DOWN + "*BOUNDARY\n15, 2, 2, 0.01\n")), r"line \d+: \*BOUNDARY gives component 2 of node 15 the value 0.01, .*-0.01"),
+    "a displacement across the plane": (deck(steps=step("*BOUNDARY\nTOP, 3, 3, 0.1\n")), r"line \d+: \*BOUNDARY moves node 14 in component 3"),
+    "a force across the plane": (deck(steps=step("*CLOAD\n16, 3, 0.1\n")), r"line \d+: \*CLOAD loads node 16 in component 3"),
+    "a force that is no number": (deck(steps=step("*CLOAD\n16, 1, much\n")), r"line \d+: \*CLOAD has 'much'; expected a number"),
+    "a force without a value": (deck(steps=step("*CLOAD\n16, 1\n")), r"line \d+: \*CLOAD has 2 entries in a line; expected 3"),
+    "a force outside of steps": (deck(steps="*CLOAD\n16, 1, 1.\n" + PRESSED), r"line \d+: \*CLOAD stands outside of steps"),
+    "a force that follows": (deck(steps=step("*CLOAD, FOLLOWER\n16, 1, 1.\n")), r"line \d+: \*CLOAD has FOLLOWER"),
+    "two pressures on one face": (deck(steps=step(PUSH + "*DLOAD\n12, P2, 1.\n")), r"line \d+: \*DLOAD gives P2 of element 12 the value 1, .* 2 in the same step"),
+    "a load that is none": (deck(steps=step("*DLOAD\n12, HP, 1.\n")), r"line \d+: \*DLOAD has the load HP"),
+    "a face that is none": (deck(steps=step("*DLOAD\n12, P5, 1.\n")), r"line \d+: \*DLOAD loads P5 of element 12 of type CPE4, which has 4 faces"),
+    "gravity without a direction": (deck(steps=step("*DLOAD\nUPPER, GRAV, 9.81\n")), r"line \d+: \*DLOAD has GRAV without a direction"),
+    "gravity in a long direction": (deck(steps=step("*DLOAD\nUPPER, GRAV, 9.81, 0., -2., 0.\n")), r"line \d+: \*DLOAD has GRAV with a direction of length 2"),
+    "gravity without density": (deck(materials=MATERIALS.replace("*DENSITY\n2.\n", ""), steps=step("*DLOAD\nUPPER, GRAV, 9.81, 0., -1., 0.\n")), r"line \d+: \*DLOAD has GRAV on elements of SOFT, which has no \*DENSITY"),
+    "a surface that is none": (deck(steps=step("*DSLOAD\nRIGTH, P, 1.\n")), r"line \d+: there is no surface of faces RIGTH"),
+    "a traction": (deck(steps=step("*DSLOAD\nRIGHT, TRVEC, 1., 1., 0.\n")), r"line \d+: \*DSLOAD has the load TRVEC"),
+    "an amplitude that is none": (deck(steps=step("*DLOAD, AMPLITUDE=RISE\n12, P2, 1.\n")), r"line \d+: \*DLOAD names the amplitude RISE; expected one of none"),
+    "an amplitude backwards": (deck(materials=MATERIALS + "*AMPLITUDE, NAME=A\n1., 0., 0., 1.\n"), r"line \d+: \*AMPLITUDE has no pairs of rising times"),
+    "a periodic amplitude": (deck(materials=MATERIALS + "*AMPLITUDE, NAME=A, DEFINITION=PERIODIC\n1., 1., 1., 1.\n"), r"line \d+: \*AMPLITUDE is no table"),
+    "no such interaction": (deck(contact=CONTACT.replace("INTERACTION=DRY\nUNDER", "INTERACTION=WET\nUNDER")), r"line \d+: \*CONTACT PAIR names the interaction WET; expected one of DRY"),
+    "no such surface": (deck(contact=CONTACT.replace("ON\n", "OFF\n").replace("FRICTIOFF", "FRICTION")), r"line \d+: \*CONTACT PAIR names OFF"),
+    "one surface": (deck(contact=CONTACT.replace(", ON", "")), r"line \d+: \*CONTACT PAIR names UNDER; expected two surfaces"),
+    "friction below 0": (deck(contact=CONTACT.replace("0.3", "-0.3")), r"line \d+: \*FRICTION has the coefficient -0.3"),
+    "friction without limit": (deck(contact=CONTACT.replace("*FRICTION\n0.3", "*FRICTION, ROUGH")), r"line \d+: \*FRICTION has ROUGH"),
+    "friction of nothing": (deck(contact="*FRICTION\n0.3\n"), r"line \d+: \*FRICTION stands without \*SURFACE INTERACTION"),
+    "friction in a step": (deck(steps=step("*FRICTION\n0.1\n")), r"line \d+: \*FRICTION stands in a step without \*CHANGE FRICTION"),
+    "another interaction changes": (deck(steps=step("*CHANGE FRICTION, INTERACTION=WET\n*FRICTION\n0.1\n")), r"line \d+: \*CHANGE FRICTION names the interaction WET"),
+    "surfaces that cannot part": (deck(contact=CONTACT.replace("*FRICTION", "*SURFACE BEHAVIOR, NO SEPARATION\n*FRICTION")), r"line \d+: \*SURFACE BEHAVIOR has NO SEPARATION"),
+    "a clearance of no pair": (deck(contact=CONTACT + "*CLEARANCE, SLAVE=ON, MASTER=UNDER, VALUE=0.1\n"), r"line \d+: \*CLEARANCE names the pair ON:UNDER; .* UNDER:ON"),
+    "a clearance of no size": (deck(contact=CONTACT + "*CLEARANCE, SLAVE=UNDER, MASTER=ON\n"), r"line \d+: \*CLEARANCE has no VALUE"),
+    "contact in a step": (deck(steps=step("*CONTACT PAIR, INTERACTION=DRY\nUNDER, ON\n")), r"line \d+: \*CONTACT PAIR stands in a step"),
+    "two coefficients of one surface": (deck(contact=CONTACT + "*SURFACE INTERACTION, NAME=WET\n*CONTACT PAIR, INTERACTION=WET\nUNDER, RIGHT\n"), r"line \d+: the surface UNDER has friction"),
+    "elements of no material": (deck(materials=MATERIALS.replace("*SOLID SECTION, ELSET=UPPER, MATERIAL=SOFT\n", "")), r"element 11 and 1 others have no \*SOLID SECTION"),
+    "no such material": (deck(materials=MATERIALS.replace("MATERIAL=SOFT", "MATERIAL=SOFTER")), r"line \d+: \*SOLID SECTION names the material SOFTER"),
+    "an unknown card": (deck(steps=step("*CREEP LOAD\n1.\n")), r"line \d+: \*CREEP LOAD is not read, .*--ignore CREEPLOAD"),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("name", WRONG)
+def test_what_cannot_be_used_is_refused_in_one_sentence_with_its_line(read, name):
+    text, words = WRONG[name]
+    with pytest.raises(enumsol.InvalidProblemError, match=words) as found:
+        read(text).problem()
+    assert "\n" not in str(found.value)
+    assert "model.inp" in str(found.value)
+
+
+def test_what_is_ignored_is_said(read):
+    text = deck(
+        materials=MATERIALS.replace("*DENSITY\n2.", "*PLASTIC\n1., 0."), steps=step(DOWN + PUSH, ", NLGEOM, INC=100")
+    )
+    model = read(text, ignore=["plastic", "NLGEOM"])
+    assert_same(model.problem(), by_hand(density=None))
+    assert "*PLASTIC              not used, as you say" in str(model)
+    assert "NLGEOM is ignored: displacements are small" in str(model)
+
+
+def test_the_account_names_every_card_with_its_line(read):
+    text = deck(steps=step(DOWN + PUSH + "*NODE FILE\nU\n"))
+    told = str(read(text))
+    for number, line in enumerate(text.splitlines(), 1):
+        if line.startswith("*") and not line.startswith(("*HEADING", "*END", "*STATIC")):
+            name = line.split(",")[0]
+            rows = [row for row in told.splitlines() if f" {name} " in row]
+            assert any(str(number) in row.split("*")[0] for row in rows), (number, line)
+    assert "not used" in next(row for row in told.splitlines() if "*NODE FILE" in row)
+
+
+# -- histories ---------------------------------------------------------------------------------------------------------
+
+SIDEWAYS = step("*BOUNDARY\nSIDE, 1, 1, 0.\n" + DOWN)
+
+
+def test_loads_of_steps_stay_are_replaced_and_end(read):
+    steps = [
+        step(DOWN + "*CLOAD\n16, 1, 1.\n13, 1, 2.\n"),
+        step("*CLOAD\n16, 1, 5.\n"),
+        step("*CLOAD, OP=NEW\n16, 1, 3.\n*DLOAD\n12, P2, 1.\n"),
+        step("*DLOAD, OP=NEW\n11, BX, 1.\n"),
+    ]
+    model = read(deck(steps="".join(steps)))
+    parts = {"nodes": {"A": [11], "B": [8]}, "bodies": {"FIRST": [2]}}
+    options = [
+        {"force": {"A": (1, 0), "B": (2, 0)}},
+        {"force": {"A": (5, 0), "B": (2, 0)}},
+        {"force": {"A": (3, 0)}, "pressure": {"RIGHT": 1.0}},
+        {"force": {"A": (3, 0)}, "body_force": {"FIRST": (1, 0)}},
+    ]
+    by_steps = [by_hand(parts, **{"pressure": None, **each}) for each in options]
+    for number, other in enumerate(by_steps, 1):
+        assert_same(model.problem(number), other)
+    np.testing.assert_allclose([given.load for given in model.steps()], [other.f for other in by_steps], atol=1e-12)
+
+
+def test_amplitudes_end_with_their_step_unless_they_are_of_all_time(read):
+    table = "*AMPLITUDE, NAME={}{}\n0., 0., 1., 0.5, 2., 1., 3., 0.25\n"
+    materials = MATERIALS + table.format("OWN", "") + table.format("ALL", ", TIME=TOTAL TIME")
+    first = step(DOWN + "*CLOAD, AMPLITUDE=OWN\n16, 1, 8.\n*CLOAD, AMPLITUDE=ALL\n13, 1, 8.\n")
+    model = read(deck(materials=materials, steps=first + step("") + step("")))
+    parts = {"nodes": {"A": [11], "B": [8]}}
+    for number, (own, of_all) in enumerate([(4, 4), (4, 8), (4, 2)], 1):
+        assert_same(model.problem(number), by_hand(parts, pressure=None, force={"A": (own, 0), "B": (of_all, 0)}))
+
+
+def test_a_motion_of_nodes_without_contact_and_friction_are_steps_of_a_history(read):
+    second = step("*BOUNDARY\nTOP, 2, 2, -0.02\n*CHANGE FRICTION, INTERACTION=DRY\n*FRICTION\n0.1\n")
+    model = read(deck(steps=PRESSED + second))
+    first, then = by_hand(), by_hand(friction=0.1, displacement={"SIDE": (0.0, None), "TOP": (None, -0.02)})
+    found = enumsol.histories(model.problem(1), model.steps())
+    expected = enumsol.histories(first, [enumsol.LoadStep(load=p.f, friction=p.friction) for p in (first, then)])
+    assert (found.complete, found.counts) == (True, expected.counts)
+    assert [step.friction.max() for step in model.steps()] == [0.3, 0.1]
+
+
+@pytest.mark.parametrize(
+    ("cards", "what"),
+    [
+        ("*BOUNDARY, OP=NEW\nBOTTOM, 1, 2\nSIDE, 1\n", "what is held"),
+        ("*BOUNDARY\nBOTTOM, 2, 2, 0.01\n", "the displacement of nodes that are in contact or faced by such"),
+    ],
+)
+def test_steps_that_change_more_than_loads_are_refused(read, cards, what):
+    base = MESH.replace("*ELEMENT, TYPE={type}, ELSET=LOWER", "*ELEMENT, TYPE={type}, ELSET=LOWER")
+    held = HELD if "NEW" in cards else HELD.replace("BOTTOM, 1, 2", "LOWEST, 1, 2")
+    mesh = base + "*NSET, NSET=LOWEST\n1, 2, 3, 4, 5, 6\n"
+    cards = cards if "NEW" in cards else cards.replace("BOTTOM", "LOWEST")
+    with pytest.raises(enumsol.InvalidProblemError, match=rf"line \d+: step 2 changes {what}"):
+        read(deck(mesh=mesh, held=held, steps=PRESSED + step(cards))).steps()
+
+
+def test_of_several_steps_one_is_named(read):
+    model = read(deck(steps=PRESSED + step("*DLOAD\n12, P2, 4.\n")))
+    with pytest.raises(enumsol.InvalidArgumentError, match="has 2 steps; expected a history of them"):
+        model.problem()
+    with pytest.raises(enumsol.InvalidArgumentError, match="step is 3; expected one of 1 to 2"):
+        model.problem(3)
+    assert_same(model.problem(2), by_hand(pressure={"RIGHT": 4.0}))
+    assert model.step_count == 2
