@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal, NoReturn
 import typer
 
 from enumsol.cli.common import ExitStatus, finish, load_problem, parse_alpha, parse_interval, scene_of, so_far
+from enumsol.cli.decks import deck_named, is_deck
 from enumsol.cli.graph import build, read_graph
 from enumsol.cli.options import Argument, Arithmetic, Number, OutputFile, Problem, Quiet
 from enumsol.cli.output import deliver
@@ -130,7 +131,8 @@ def _audit_result(
     if body.mesh is None:
         raise InvalidArgumentError(f"{name} has no mesh; expected a problem made of one, to compare with {file}")
     plane = None if about is None else about.options.plane
-    moved = result.on(body.mesh, axisymmetric=str(plane) == "axisymmetric")
+    numbers = deck_named(name).node_names if is_deck(name) else None
+    moved = result.on(body.mesh, numbers, axisymmetric=str(plane) == "axisymmetric")
     with search_display() as display:
         found, ended = so_far(
             lambda: enumerate_roots(body, parse_alpha(alpha or "0"), arithmetic=arithmetic, progress=display)
