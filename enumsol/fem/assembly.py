@@ -1,4 +1,4 @@
-"""A plane body on a rigid foundation: stiffness by scikit-fem, loads, and the ContactProblem.
+"""A plane body on a rigid foundation: stiffness, loads, and the ContactProblem.
 
 Cells are triangles or quadrilaterals of first or second order, with 3, 6, 4, 8 or 9 nodes in the order of VTK, or both
 as in `PartedMesh`. Degrees of freedom before constraints are ``2 node + component``. A problem is put together from
@@ -20,7 +20,7 @@ import scipy.sparse as sp
 
 from enumsol.errors import InvalidArgumentError
 from enumsol.fem import meshes
-from enumsol.fem.bases import FLAT, between_corners, facet_basis, nodal_basis
+from enumsol.fem.bases import FLAT, between_corners, facet_basis, isotropic, nodal_basis
 from enumsol.fem.meshes import SAME, unit_vectors, vectors_of_all
 from enumsol.fem.restrained import Body, Supports, axes_of, gathered, movable, problem_of
 from enumsol.model.cells import numbers_of_nodes
@@ -45,7 +45,7 @@ if TYPE_CHECKING:
 
 
 def stiffness(points: ArrayLike, cells: ArrayLike, lame: tuple[float, float]) -> sp.csc_array:
-    """Stiffness of the unconstrained body in plane strain, (2N, 2N), assembled by scikit-fem.
+    """Stiffness of the unconstrained body in plane strain, (2N, 2N).
 
     Parameters
     ----------
@@ -76,7 +76,7 @@ def stiffness(points: ArrayLike, cells: ArrayLike, lame: tuple[float, float]) ->
     (12, 12)
     """
     lam, mu = meshes.lame_coefficients(lame, 2)
-    return nodal_basis(*plane_mesh(points, cells)).stiffness(lam, mu)
+    return nodal_basis(*plane_mesh(points, cells)).stiffness(isotropic(np.array([lam, mu]), 3))
 
 
 def plane_mesh(points: ArrayLike, cells: ArrayLike) -> tuple[Floats, Integers]:

@@ -1,27 +1,26 @@
-"""Displacements on a mesh: scikit-fem's basis of the cells of each kind, by nodes; stresses, and norms."""
+"""Displacements on a mesh: shape functions of cells of each kind, and what is integrated of them; stresses, norms."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import cache, cached_property
-from typing import TYPE_CHECKING, Any
+from functools import cached_property
+from typing import TYPE_CHECKING
 
 import numpy as np
 import scipy.sparse as sp
 
 from enumsol.errors import InvalidArgumentError
 from enumsol.fem.meshes import cell_name, check_every_node_is_used, check_facets
-from enumsol.model.cells import KINDS, by_kind
+from enumsol.model.cells import KINDS, boundary, by_kind, corner_keys, node_counts
 from enumsol.support.arguments import instance_of
 from enumsol.support.array_arguments import vector_of
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
+    from collections.abc import Callable, Iterator
 
-    from skfem import BilinearForm, CellBasis, DiscreteField, FacetBasis
-    from skfem.assembly.form.form import FormExtraParams
-    from skfem.element import Element
+    from skfem import CellBasis, FacetBasis
 
+    from enumsol.model.cells import CellKind
     from enumsol.model.problem3d import AnyProblem, ContactProblem3D
     from enumsol.support.array_types import ArrayLike, Floats, Integers, Mask
 
@@ -30,13 +29,24 @@ if TYPE_CHECKING:
 FLAT = 1e-14
 #: Quadrature of degree two on triangles, at the nodes between corners: the nodes that can be in contact.
 _BETWEEN = (np.array([[0.5, 0.5, 0.0], [0.0, 0.5, 0.5]]), np.full(3, 1 / 6))
+#: Degree of quadrature on facets: normals of quadratic curved edges.
+_ON_FACETS = 5
+#: Numbers that arrays hold at a time while stiffness is integrated.
+_AT_ONCE = 4_000_000
 
 #: Simplices that a cell of so many corners consists of, by dimension.
 SIMPLICES = {
     (2, 3): [[0, 1, 2]],
     (2, 4): [[0, 1, 2], [0, 2, 3]],
     (3, 4): [[0, 1, 2, 3]],
+    (3, 6): [[0, 1, 2, 5], [0, 1, 5, 4], [0, 4, 5, 3]],
     (3, 8): [[0, 1, 2, 6], [0, 2, 3, 6], [0, 3, 7, 6], [0, 7, 4, 6], [0, 4, 5, 6], [0, 5, 1, 6]],
+}
+#: Components of strains and stresses, in this order, by their number: in the plane, of axisymmetric bodies, in 3D.
+COMPONENTS = {
+    3: ((0, 0), (1, 1), (0, 1)),
+    4: ((0, 0), (1, 1), (2, 2), (0, 1)),
+    6: ((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2)),
 }
 
 
@@ -46,87 +56,152 @@ class Block:
 
     Attributes
     ----------
-    basis : skfem.CellBasis
-        Of nodal vectors.
-    dofs : (m, dimension) int array
-        scikit-fem's number of each component of each node of these cells.
-    nodes : (m,) int array
-        These nodes, in order.
+    kind : CellKind
     rows : (k,) int array
         Which cells of the mesh they are.
-    corners : (v,) int array
-        The nodes that are corners of cells, in order: scikit-fem's vertices.
+    nodes : (k, a) int array
+    corners : (k, a, d) array
+        Places of the nodes.
+    degree : of the quadrature
     """
 
-    basis: CellBasis
-    dofs: Integers
-    nodes: Integers
+    kind: CellKind
     rows: Integers
-    corners: Integers
+    nodes: Integers
+    corners: Floats
+    degree: int
 
     @cached_property
-    def ours(self) -> Integers:
-        """The number here of each degree of freedom of scikit-fem."""
-        ours = np.empty(self.dofs.size, dtype=np.int64)
-        dimension = self.dofs.shape[1]
-        ours[self.dofs] = dimension * self.nodes[:, None] + np.arange(dimension)
-        return ours
-
-    def on_facets(self, numbers: Integers, *, lumped: bool) -> Any:
-        """The `facet_basis` of these facets; it is slow to make, and so kept for everything that acts on them."""
-        key = (numbers.tobytes(), lumped)
-        if key not in self._on_facets:
-            self._on_facets[key] = facet_basis(self.basis, numbers, lumped=lumped)
-        return self._on_facets[key]
-
-    @cached_property
-    def _on_facets(self) -> dict[tuple[bytes, bool], Any]:
-        return {}
+    def _reference(self) -> tuple[Floats, Floats, Floats]:
+        places, weights = self.kind.quadrature(self.degree)
+        return self.kind.values(places), self.kind.slopes(places), weights
 
     @property
-    def outer(self) -> dict[tuple[int, ...], int]:
-        """scikit-fem's numbers of the facets that belong to one of these cells only, by their corners."""
-        mesh = self.basis.mesh
-        numbers = mesh.boundary_facets()
-        keys = np.sort(self.corners[mesh.facets[:, numbers]], axis=0).T.tolist()
-        return {tuple(key): int(number) for key, number in zip(keys, numbers, strict=True)}
+    def values(self) -> Floats:
+        """Shape functions at the points of quadrature, (a, q)."""
+        return self._reference[0]
+
+    @cached_property
+    def jacobians(self) -> Floats:
+        """Derivatives of the position, (k, q, d, d)."""
+        return np.asarray(np.einsum("mai,akq->mqik", self.corners, self._reference[1]))
+
+    @cached_property
+    def dx(self) -> Floats:
+        """Weights of the points, (k, q), which add up to areas or volumes."""
+        return np.asarray(np.abs(np.linalg.det(self.jacobians)) * self._reference[2])
+
+    @property
+    def places(self) -> Floats:
+        """Positions of the points, (k, q, d)."""
+        return np.asarray(np.einsum("mai,aq->mqi", self.corners, self.values))
+
+    def gradients(self, some: slice) -> Floats:
+        """Derivatives of the shape functions with respect to the position, (k, q, a, d)."""
+        slopes = np.moveaxis(self._reference[1], 2, 0)
+        return np.asarray(slopes[None] @ np.linalg.inv(self.jacobians[some]))
+
+    def some(self, each: int) -> Iterator[slice]:
+        """Cells a few at a time, if ``each`` numbers are held of one."""
+        step = max(1, _AT_ONCE // each)
+        return (slice(first, first + step) for first in range(0, len(self.rows), step))
 
 
 @dataclass(frozen=True)
 class NodalBasis:
-    """Bases of scikit-fem on all cells of a mesh.
+    """Shape functions on all cells of a mesh.
 
     Attributes
     ----------
     blocks : tuple of Block
-    shape : (N, dimension)
+    points : (N, d) array
+    cells : (M, k) int array
     thickness : (M,) array or None
         Thickness of a plane body, cell by cell; stiffness, tractions and forces per volume are multiplied by it. None
         stands for 1 [length].
     """
 
     blocks: tuple[Block, ...]
-    shape: tuple[int, int]
+    points: Floats
+    cells: Integers
     thickness: Floats | None = None
 
-    def matrix(self, form: BilinearForm) -> sp.csc_array:
-        """The matrix of a bilinear form of scikit-fem, made exactly symmetric."""
-        return self._gathered(lambda block: form.assemble(block.basis))
+    @property
+    def shape(self) -> tuple[int, int]:
+        """(N, d)."""
+        return self.points.shape[0], self.points.shape[1]
 
-    def _gathered(self, assembled: Callable[[Block], Any]) -> sp.csc_array:
+    @property
+    def count(self) -> int:
+        """Number of cells."""
+        return len(self.cells)
+
+    @property
+    def sizes(self) -> Floats:
+        """Areas or volumes of the cells, (M,)."""
+        sizes = np.empty(self.count)
+        for block in self.blocks:
+            sizes[block.rows] = np.sum(block.dx, axis=1)
+        return sizes
+
+    def weights(self, block: Block) -> Floats:
+        """Weights of the points of quadrature of cells, (k, q), by which whatever is integrated is multiplied."""
+        return block.dx if self.thickness is None else block.dx * self.thickness[block.rows, None]
+
+    def strains(self, block: Block, some: slice) -> Floats:
+        """Strains of the nodal displacements of cells, (k, q, s, a d): shears are angles (theory, section 11.6)."""
+        G = block.gradients(some)
+        count, points, nodes, d = G.shape
+        B = np.zeros((count, points, self.components, nodes, d))
+        for row, (i, j) in enumerate(COMPONENTS[self.components]):
+            if j < d:
+                B[:, :, row, :, i] = G[..., j]
+            if i != j:
+                B[:, :, row, :, j] = G[..., i]
+        return B.reshape(count, points, self.components, nodes * d)
+
+    @property
+    def components(self) -> int:
+        """Number of components of strains."""
+        return 3 if self.shape[1] == 2 else 6
+
+    def stiffness(self, elasticity: Floats) -> sp.csc_array:
+        """Stiffness of a linear elastic body, (d N, d N), of (s, s) moduli of all cells or (M, s, s) of each."""
+        moduli = np.broadcast_to(elasticity, (self.count, self.components, self.components))
+        rows, columns, data = [], [], []
+        with np.errstate(over="ignore", invalid="ignore"):  # problems refuse what is not finite
+            for block in self.blocks:
+                weights, d = self.weights(block), self.shape[1]
+                size = block.nodes.shape[1] * d
+                for some in block.some(size * (size + 2 * self.components * weights.shape[1])):
+                    B = self.strains(block, some)
+                    D = moduli[block.rows[some], None] * weights[some, :, None, None]
+                    flat = (len(B), -1, size)
+                    K = B.reshape(flat).transpose(0, 2, 1) @ (D @ B).reshape(flat)
+                    dofs = (d * block.nodes[some, :, None] + np.arange(d)).reshape(len(B), size)
+                    rows.append(np.repeat(dofs, size, axis=1).ravel())
+                    columns.append(np.tile(dofs, size).ravel())
+                    data.append(K.ravel())
+            return _gathered(rows, columns, data, self.shape[0] * self.shape[1])
+
+    def gram(self) -> sp.csc_array:
+        """Products of functions and of their gradients, (N, N): those of one component in H^1."""
         rows, columns, data = [], [], []
         for block in self.blocks:
-            entries = sp.coo_array(assembled(block))
-            rows.append(block.ours[entries.coords[0]])
-            columns.append(block.ours[entries.coords[1]])
-            data.append(entries.data)
-        size = self.shape[0] * self.shape[1]
-        places = (np.concatenate(rows), np.concatenate(columns))
-        A = sp.csc_array((np.concatenate(data), places), shape=(size, size))
-        return sp.csc_array(0.5 * (A + A.T))
+            for some in block.some(block.values.size * (self.shape[1] + block.nodes.shape[1])):
+                G, weights = block.gradients(some), block.dx[some]
+                K = np.einsum("mqai,mqbi,mq->mab", G, G, weights, optimize=True)
+                K += np.einsum("aq,bq,mq->mab", block.values, block.values, weights, optimize=True)
+                own = block.nodes[some]
+                rows.append(np.repeat(own, own.shape[1], axis=1).ravel())
+                columns.append(np.tile(own, own.shape[1]).ravel())
+                data.append(K.ravel())
+        return _gathered(rows, columns, data, self.shape[0])
 
-    def on_part(self, facets: Integers, name: str, form: Callable[[Any, Any], Any], *, lumped: bool = False) -> Floats:
-        """Integrals over facets of a linear form of scikit-fem, by nodes: (N, dimension).
+    def on_part(
+        self, facets: Integers, name: str, traction: Callable[[Floats], Floats | float], *, lumped: bool = False
+    ) -> Floats:
+        """Nodal forces (N, d) of tractions on facets, from outward unit normals (d, k, q) at points of quadrature.
 
         With ``lumped``, integrals over triangles of second order use the nodes between corners only, so that the
         integrals of 1 are positive there and zero at corners.
@@ -136,92 +211,96 @@ class NodalBasis:
         InvalidArgumentError
             One of the facets is not on the boundary of the body, has another number of nodes, or is given twice.
         """
-        from skfem import LinearForm  # as below
-
-        total = np.zeros(self.shape)
-        for block, numbers in zip(self.blocks, self.facet_numbers(facets, name), strict=True):
-            if len(numbers):
-                basis = block.on_facets(numbers, lumped=lumped)
-                if self.thickness is None:
-                    integrals = LinearForm(form).assemble(basis)
-                else:
-                    of_facets = self.thickness[block.rows][block.basis.mesh.f2t[0, numbers]]
-                    scaled = LinearForm(lambda v, w: w.thickness * form(v, w))
-                    integrals = scaled.assemble(basis, thickness=of_facets[:, None])
-                total[block.nodes] += np.asarray(integrals)[block.dofs]
+        total, (outer, owners) = np.zeros(self.shape), self._outer
+        found = self.facet_numbers(facets, name)
+        for rows, nodes in by_kind(self.shape[1] - 1, outer[found]) if len(found) else []:
+            kind, owner = KINDS[self.shape[1] - 1, nodes.shape[1]], owners[found[rows]]
+            between = lumped and (self.shape[1], nodes.shape[1]) == (3, 6)
+            places, weights = _BETWEEN if between else kind.quadrature(_ON_FACETS)
+            places = places.T if between else places
+            tangents = np.einsum("mai,akq->kimq", self.points[nodes], kind.slopes(places))
+            plane = len(tangents) == 1
+            across = (
+                np.stack([tangents[0, 1], -tangents[0, 0]]) if plane else np.cross(tangents[0], tangents[1], axis=0)
+            )
+            areas = np.linalg.norm(across, axis=0)
+            normals = self._signs[owner, None] * across / areas
+            share = areas * weights * (1.0 if self.thickness is None else self.thickness[owner, None])
+            values = np.broadcast_to(traction(normals), normals.shape) * share
+            np.add.at(total, nodes, np.einsum("dmq,aq->mad", values, kind.values(places)))
         return total
 
-    def facet_numbers(self, facets: Integers, name: str) -> list[Integers]:
-        """scikit-fem's numbers, block by block, of facets that are given by their nodes, corners first.
+    def facet_numbers(self, facets: Integers, name: str) -> Integers:
+        """Rows among the facets of the boundary of facets that are given by their nodes, corners first.
 
         Raises
         ------
         InvalidArgumentError
             As in `on_part`.
         """
-        mesh = self.blocks[0].basis.mesh
-        corners, count = len(mesh.facets), len(mesh.bndelem.doflocs)
-        if facets.shape[1] != count:
+        d, outer = self.shape[1], self._outer[0]
+        if facets.shape[1] > outer.shape[1] or (len(facets) and (d - 1, facets.shape[1]) not in KINDS):
             raise InvalidArgumentError(
-                f"{name} has facets of {facets.shape[1]} nodes; expected {count}, as the cells have"
+                f"{name} has facets of {facets.shape[1]} nodes; expected {outer.shape[1]}, as the cells have"
             )
-        keys = [tuple(key) for key in np.sort(facets[:, :corners], axis=1).tolist()]
-        found = [self._outer.get(key, -1) for key in keys]
+        found = [self._numbers.get(tuple(key), -1) for key in corner_keys(d, facets).tolist()]
         check_facets(found, facets, name)
-        numbers = np.array(found, dtype=np.int64).reshape(-1, 2)
-        return [numbers[numbers[:, 0] == k, 1] for k in range(len(self.blocks))]
+        numbers = np.array(found, dtype=np.int64)
+        own, expected = (np.max(node_counts(rows), initial=0) for rows in (facets, outer[numbers]))
+        if own != expected:
+            raise InvalidArgumentError(f"{name} has facets of {own} nodes; expected {expected}, as the cells have")
+        return numbers
 
     @cached_property
-    def _outer(self) -> dict[tuple[int, ...], tuple[int, int]]:
-        """Block and number of each facet that belongs to one cell only, by its corners."""
-        known: dict[tuple[int, ...], tuple[int, int]] = {}
-        for k, block in enumerate(self.blocks):
-            for key, number in block.outer.items():
-                if known.pop(key, None) is None:  # between cells of two kinds
-                    known[key] = (k, number)
-        return known
+    def _outer(self) -> tuple[Integers, Integers]:
+        return boundary(self.shape[1], self.cells)
 
-    def stiffness(self, lam: float | Floats, mu: float | Floats) -> sp.csc_array:
-        """Stiffness of a linear elastic body with these Lame coefficients, of all cells or of each, in plane strain."""
-        from skfem import BilinearForm  # as below
-        from skfem.helpers import ddot, div, sym_grad
-        from skfem.models.elasticity import linear_elasticity
+    @cached_property
+    def _numbers(self) -> dict[tuple[int, ...], int]:
+        """Rows of the facets on the boundary by their corners."""
+        return {tuple(key): row for row, key in enumerate(corner_keys(self.shape[1], self._outer[0]).tolist())}
 
-        def energy(u: DiscreteField, v: DiscreteField, w: FormExtraParams) -> Any:
-            # as linear_elasticity has it, which makes an identity of every quadrature point and is slow in 3D
-            return w.lam * div(u) * div(v) + 2.0 * w.mu * ddot(sym_grad(u), sym_grad(v))
-
-        uniform = np.ndim(lam) == 0 and self.thickness is None
-        factor = np.ones(()) if self.thickness is None else self.thickness
-        first, second = (np.broadcast_to(factor * value, self.count) for value in (lam, mu))
-
-        def of_block(block: Block) -> Any:
-            own = first[block.rows], second[block.rows]
-            if block.basis.Nbfun > 24:  # scikit-fem has a long loop over pairs of functions
-                return _solid_stiffness(block.basis, *own)
-            if uniform and self.shape[1] == 2:
-                return linear_elasticity(float(first[0]), float(second[0])).assemble(block.basis)
-            return BilinearForm(energy).assemble(block.basis, lam=own[0][:, None], mu=own[1][:, None])
-
-        with np.errstate(over="ignore", invalid="ignore"):  # problems refuse what is not finite
-            return self._gathered(of_block)
-
-    @property
-    def count(self) -> int:
-        """Number of cells."""
-        return sum(len(block.rows) for block in self.blocks)
+    @cached_property
+    def _signs(self) -> Floats:
+        """1.0 for cells whose nodes are in the order of a positive volume, -1.0 for others, (M,)."""
+        signs = np.empty(self.count)
+        for block in self.blocks:
+            signs[block.rows] = np.sign(np.linalg.det(block.jacobians[:, 0]))
+        return signs
 
     def volume_forces(self, density: Floats) -> Floats:
-        """Nodal forces (N, dimension) of a force per volume that is constant on each cell, (M, dimension)."""
-        from skfem import LinearForm  # as below
-        from skfem.helpers import dot
-
-        form, total = LinearForm(lambda v, w: dot(w.density, v)), np.zeros(self.shape)
-        each = np.asarray(density) if self.thickness is None else self.thickness[:, None] * density
+        """Nodal forces (N, d) of a force per volume that is constant on each cell, (M, d)."""
+        total = np.zeros(self.shape)
         for block in self.blocks:
-            of_block = each[block.rows].T[:, :, None]
-            total[block.nodes] += np.asarray(form.assemble(block.basis, density=of_block))[block.dofs]
+            shares = self.weights(block) @ block.values.T
+            np.add.at(total, block.nodes, shares[:, :, None] * density[block.rows, None])
         return total
+
+    def means(self, u: Floats) -> Floats:
+        """Mean strains of the cells, (M, s), of displacements (N, d) of the nodes."""
+        found = np.empty((self.count, self.components))
+        for block in self.blocks:
+            for some in block.some(self.components * self.shape[1] * block.values.size):
+                moved = u[block.nodes[some]].reshape(len(block.rows[some]), -1)
+                weights = self.weights(block)[some]
+                strains = np.einsum("mqsk,mk,mq->ms", self.strains(block, some), moved, weights, optimize=True)
+                found[block.rows[some]] = strains / np.sum(weights, axis=1)[:, None]
+        return found
+
+
+def _gathered(rows: list[Integers], columns: list[Integers], data: list[Floats], size: int) -> sp.csc_array:
+    """The matrix of these entries, made exactly symmetric."""
+    places = (np.concatenate(rows), np.concatenate(columns))
+    A = sp.csc_array((np.concatenate(data), places), shape=(size, size))
+    return sp.csc_array(0.5 * (A + A.T))
+
+
+def isotropic(lame: Floats, components: int) -> Floats:
+    """Moduli (..., s, s) of Lame coefficients (..., 2)."""
+    lam, mu = np.moveaxis(np.asarray(lame), -1, 0)[:, ..., None, None]
+    direct = np.diag([float(i == j) for i, j in COMPONENTS[components]])
+    along = np.outer(np.diag(direct), np.diag(direct))
+    return np.asarray(lam * along + mu * (np.eye(components) + direct))
 
 
 def nodal_basis(nodes: Floats, cells: Integers, degree: int = 0, labels: Integers | None = None) -> NodalBasis:
@@ -232,53 +311,38 @@ def nodal_basis(nodes: Floats, cells: Integers, degree: int = 0, labels: Integer
     Raises
     ------
     InvalidArgumentError
-        A node belongs to no cell, a cell is flat, folded or inside out at a corner, or two overlap that share a facet.
+        A node belongs to no cell, a cell is flat, folded or inside out at a corner, two overlap that share a facet, or
+        do not fit together at one.
     """
     kinds = by_kind(nodes.shape[1], cells)
-    used = np.unique(np.concatenate([nodes_of.ravel() for _, nodes_of in kinds]))
-    check_every_node_is_used(used, len(nodes), "cells", "cell")
+    check_every_node_is_used(cells, len(nodes), "cells", "cell")
     blocks = tuple(_block(nodes, rows, nodes_of, degree, labels) for rows, nodes_of in kinds)
     refuse_wrong_sides(nodes, cells, labels)
-    return NodalBasis(blocks, (nodes.shape[0], nodes.shape[1]))
+    body = NodalBasis(blocks, nodes, cells)
+    if len(kinds) > 1:
+        refuse_misfits(nodes, *body._outer, labels)
+    return body
 
 
 def _block(points: Floats, rows: Integers, cells: Integers, degree: int, labels: Integers | None) -> Block:
-    # scikit-fem takes a while to import and is needed for meshes only
-    import skfem
-    from skfem.quadrature import get_quadrature
-
-    dimension = points.shape[1]
-    kind = KINDS[dimension, cells.shape[1]]
-    nodes, local = np.unique(cells, return_inverse=True)
-    local = local.reshape(cells.shape)
-    # sorted here, so that scikit-fem neither renumbers nor logs
-    ordered = np.sort(local, axis=1) if kind.simplex else local
-    element = getattr(skfem, kind.element)()
-    if kind.places is not None:
-        places = kind.places
-        ordered = ordered[:, [int(np.argmin(np.linalg.norm(places - place, axis=1))) for place in element.doflocs]]
-    order = max(kind.degree, degree)
-    wrong = _folded(points[nodes][ordered], element, get_quadrature(element, order)[0])
+    kind = KINDS[points.shape[1], cells.shape[1]]
+    block = Block(kind, rows, cells, points[cells], max(kind.degree, degree))
+    wrong = _folded(block)
     if np.any(wrong):
         raise InvalidArgumentError(
             f"{cell_name(int(rows[np.argmax(wrong)]), labels)} is flat, folded or inside out at a corner; expected "
             "proper cells with their nodes in the order of VTK"
         )
-    mesh_class = _serendipity() if kind.mesh == "MeshQuadS2" else getattr(skfem, kind.mesh)
-    mesh = mesh_class(np.ascontiguousarray(points[nodes].T), np.ascontiguousarray(ordered.T))
-    basis = skfem.Basis(mesh, skfem.ElementVector(element), intorder=order)
-    dofs = np.empty((len(nodes), dimension), dtype=np.int64)
-    dofs[ordered.T] = np.swapaxes(basis.element_dofs.reshape(cells.shape[1], dimension, len(cells)), 1, 2)
-    return Block(basis, dofs, nodes, rows, np.unique(cells[:, : kind.corners]))
+    return block
 
 
 def facet_basis(basis: CellBasis, facets: Integers, *, lumped: bool = False) -> FacetBasis:
     """scikit-fem's basis on facets; see `NodalBasis.on_part`."""
-    from skfem import FacetBasis  # as above
+    from skfem import FacetBasis  # scikit-fem takes a while to import
 
     if lumped and between_corners(basis.elem):
         return FacetBasis(basis.mesh, basis.elem, facets=facets, quadrature=_BETWEEN)
-    return FacetBasis(basis.mesh, basis.elem, facets=facets, intorder=5)  # normals of quadratic curved edges
+    return FacetBasis(basis.mesh, basis.elem, facets=facets, intorder=_ON_FACETS)
 
 
 def between_corners(element: object) -> bool:
@@ -288,41 +352,14 @@ def between_corners(element: object) -> bool:
     return isinstance(getattr(element, "elem", element), ElementTetP2)
 
 
-def _solid_stiffness(basis: CellBasis, lam: Floats, mu: Floats) -> sp.coo_array:
-    """The stiffness in 3D that the form of the energy gives, for all pairs of functions of a cell at once."""
-    # degrees of freedom of a cell are node by node, and a gradient is that of one component
-    slopes = np.stack([basis.basis[j][0].grad[0] for j in range(0, basis.Nbfun, 3)])
-    nodes, _, cells, points = slopes.shape
-    G = slopes.transpose(2, 0, 1, 3).reshape(cells, 3 * nodes, points)
-    T = ((G * basis.dx[:, None]) @ G.transpose(0, 2, 1)).reshape(cells, nodes, 3, nodes, 3)
-    lam, mu = lam[:, None, None, None, None], mu[:, None, None, None, None]
-    K = lam * T + mu * T.transpose(0, 1, 4, 3, 2)
-    K += mu * np.einsum("maibi,jk->majbk", T, np.eye(3))
-    dofs = basis.element_dofs.T
-    places = (np.repeat(dofs, basis.Nbfun, axis=1).ravel(), np.tile(dofs, basis.Nbfun).ravel())
-    return sp.coo_array((K.ravel(), places), shape=(basis.N, basis.N))
-
-
-@cache
-def _serendipity() -> Any:
-    """A mesh class of quadrilaterals without a node inside, like scikit-fem's MeshQuad2 but for its element."""
-    import skfem  # as above
-
-    names = {
-        "__annotations__": {"elem": type},
-        "elem": skfem.ElementQuadS2,
-        "bndelem": property(lambda mesh: skfem.ElementLineP2()),
-    }
-    return dataclass(repr=False)(type("MeshQuadS2", (skfem.MeshQuad2,), names))
-
-
-def _folded(corners: Floats, element: Element, quadrature: Floats) -> Mask:
+def _folded(block: Block) -> Mask:
     """Cells whose area or volume vanishes or changes its sign at a corner or a quadrature point."""
-    places = np.concatenate([element.refdom.init_refdom()[0], quadrature], axis=1)
-    slopes = [np.broadcast_to(element.lbasis(places, i)[1], places.shape) for i in range(corners.shape[1])]
+    corners, d = block.corners, block.corners.shape[2]
+    ends = block.kind.slopes(block.kind.places[: block.kind.corners])
     with np.errstate(all="ignore"):  # what over- or underflows is among them
-        values = np.linalg.det(np.einsum("mai,akq->mqik", corners, np.stack(slopes)))
-    extents = np.max(np.ptp(corners, axis=1), axis=1) ** corners.shape[2]
+        at_ends = np.linalg.det(np.einsum("mai,akq->mqik", corners, ends))
+        values = np.concatenate([at_ends, np.linalg.det(block.jacobians)], axis=1)
+    extents = np.max(np.ptp(corners, axis=1), axis=1) ** d
     flat = np.min(np.abs(values), axis=1) <= FLAT * extents
     return np.asarray(flat | (np.abs(np.sum(np.sign(values), axis=1)) < values.shape[1]))
 
@@ -341,19 +378,25 @@ def refuse_wrong_sides(points: Floats, cells: Integers, labels: Integers | None)
     InvalidArgumentError
         There are such; it names two of them.
     """
-    dimension, sides, owners = points.shape[1], [], []
+    dimension = points.shape[1]
+    sides: dict[int, list[tuple[Integers, Integers]]] = {}
     for rows, corners in corners_of(dimension, cells):
-        kind = KINDS[dimension, corners.shape[1]]
-        facets = corners[:, kind.facets]
-        simplex = points[corners[:, SIMPLICES[dimension, kind.corners][0]]]
+        simplex = points[corners[:, SIMPLICES[dimension, corners.shape[1]][0]]]
         turned = np.linalg.det(simplex[:, 1:] - simplex[:, :1]) < 0
-        facets[turned] = facets[turned][:, :, ::-1]
-        sides.append(facets.reshape(-1, facets.shape[2]))
-        owners.append(np.repeat(rows, facets.shape[1]))
-    every, owner = np.concatenate(sides), np.concatenate(owners)
+        for side in KINDS[dimension, corners.shape[1]].sides:
+            facets = np.where(turned[:, None], corners[:, side[::-1]], corners[:, side])
+            sides.setdefault(len(side), []).append((facets, rows))
+    for some in sides.values():
+        facets, owners = (np.concatenate(part) for part in zip(*some, strict=True))
+        _refuse_same_side(points, facets, owners, labels)
+
+
+def _refuse_same_side(points: Floats, every: Integers, owner: Integers, labels: Integers | None) -> None:
+    """Refuse facets of so many corners that cells on the same side share."""
     # two cells on either side of a facet go around it in opposite directions, the least node first; edges have two ends
     first = np.argmin(every, axis=1)[:, None]
-    along = np.take_along_axis(every, (first + 1) % every.shape[1], axis=1)[:, 0] if dimension == 3 else every[:, 0]
+    solid = points.shape[1] == 3
+    along = np.take_along_axis(every, (first + 1) % every.shape[1], axis=1)[:, 0] if solid else every[:, 0]
     order = np.lexsort(np.sort(every, axis=1).T)
     keys, along, owner = np.sort(every, axis=1)[order], along[order], owner[order]
     same = np.flatnonzero(np.all(keys[1:] == keys[:-1], axis=1) & (along[1:] == along[:-1]))
@@ -371,6 +414,32 @@ def refuse_wrong_sides(points: Floats, cells: Integers, labels: Integers | None)
         f"what they share at {place_of(points[keys[k]].mean(axis=0))}, or one of them is inside out; expected cells "
         "that cover the body once"
     )
+
+
+def refuse_misfits(points: Floats, facets: Integers, owners: Integers, labels: Integers | None) -> None:
+    """Refuse cells of several kinds that meet at facets which do not fit together, though they share their corners.
+
+    ``facets`` (k, m) and ``owners`` (k,) are those of the boundary (`enumsol.model.cells.boundary`).
+
+    Raises
+    ------
+    InvalidArgumentError
+        A facet of first order meets one of second order, or a triangle a part of a quadrilateral; it names both cells.
+    """
+    keys = [tuple(key) for key in corner_keys(points.shape[1], facets).tolist()]
+    known: dict[tuple[int, ...], int] = {}
+    for row, key in enumerate(keys):
+        parts = [key] if len(key) == 2 or key[0] < 0 else [key, *((-1, *key[:k], *key[k + 1 :]) for k in range(4))]
+        for part in parts:
+            other = known.setdefault(part, row)
+            if other == row or (part != key and keys[other] != part):
+                continue
+            one, two = (cell_name(int(owners[k]), labels) for k in (other, row))
+            what = "one is of first and one of second order" if keys[other] == key else "one has a triangle there"
+            raise InvalidArgumentError(
+                f"{one} and {two} share corners at {place_of(points[[*part[part[0] < 0 :]]].mean(axis=0))}, but do not "
+                f"fit together, as {what}; expected cells that share whole facets, or bodies that share no nodes"
+            )
 
 
 def place_of(at: Floats) -> str:
@@ -415,19 +484,13 @@ def cell_stresses(problem: AnyProblem, u: ArrayLike) -> Floats:
             "the problem has no mesh with Lame coefficients; expected one made by fem.contact_problem, "
             "fem.solid_contact_problem or fem.mesh_problem, or BodyMesh(..., lame=...)"
         )
-    moved = mesh.displacements(u)
     body = nodal_basis(mesh.points, mesh.cells)
-    dimension = moved.shape[1]
-    stresses = np.empty((len(mesh.cells), dimension, dimension))
-    for block in body.blocks:
-        values = np.empty(block.dofs.size)
-        values[block.dofs] = moved[block.nodes]
-        gradient: Any = block.basis.interpolate(values).grad  # (d, d, cells, points)
-        mean = np.sum(gradient * block.basis.dx, axis=-1) / np.sum(block.basis.dx, axis=-1)
-        strain = 0.5 * np.moveaxis(mean + np.swapaxes(mean, 0, 1), -1, 0)
-        lam, mu = mesh.lame[block.rows].T[:, :, None, None]
-        trace = np.trace(strain, axis1=1, axis2=2)[:, None, None]
-        stresses[block.rows] = lam * trace * np.eye(dimension) + 2.0 * mu * strain
+    strains = body.means(mesh.displacements(u))
+    values = np.einsum("mst,mt->ms", isotropic(mesh.lame, body.components), strains)
+    d = mesh.points.shape[1]
+    stresses = np.empty((len(mesh.cells), d, d))
+    for row, (i, j) in enumerate(COMPONENTS[body.components]):
+        stresses[:, i, j] = stresses[:, j, i] = values[:, row]
     return stresses
 
 
@@ -503,20 +566,13 @@ def h1_norms(problem: ContactProblem3D) -> MeshNorms:
     >>> norms.dual.shape
     (6, 6)
     """
-    from skfem import BilinearForm  # as above
-    from skfem.helpers import ddot, dot, grad
-
     from enumsol.model.problem3d import ContactProblem3D  # not for problems in 2D
 
     instance_of(problem, ContactProblem3D, "problem")
     if problem.mesh is None or problem.areas is None:
         raise InvalidArgumentError("problem has no mesh or no areas; expected one made of a mesh")
-
-    def product(u: object, v: object, _: object) -> Any:
-        return dot(u, v) + ddot(grad(u), grad(v))
-
     # products of linear functions have degree two: exact on tetrahedra and parallelepipeds
-    body = nodal_basis(problem.mesh.points, problem.mesh.cells, degree=2)
+    gram = nodal_basis(problem.mesh.points, problem.mesh.cells, degree=2).gram()
     motion = problem.mesh.motion
-    G = sp.csc_array(motion.T @ body.matrix(BilinearForm(product)) @ motion)
+    G = sp.csc_array(motion.T @ sp.kron(gram, sp.eye_array(3)) @ motion)
     return MeshNorms(G, problem.Bn, problem.areas)

@@ -10,21 +10,20 @@ import numpy as np
 import scipy.sparse as sp
 
 from enumsol.errors import InvalidArgumentError
-from enumsol.fem.assembly import outward_normal, pressed
+from enumsol.fem.assembly import pressed
 from enumsol.fem.conditions import Obstacle, names_of
 from enumsol.fem.meshes import unit_vectors
 from enumsol.fem.restrained import ContactRows, Supports, means_of_nodes, movable
-from enumsol.model.cells import KINDS, boundary_facets, contact_nodes, facet_rows
+from enumsol.model.cells import KINDS, boundary_facets, by_kind, contact_nodes, facet_rows, lines_along, padded
 from enumsol.support.arguments import finite_number, shown
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
-
-    from skfem.element import Element
+    from collections.abc import Mapping, Sequence
 
     from enumsol.fem.bases import NodalBasis
     from enumsol.fem.conditions import Options
     from enumsol.fem.meshes import PartedMesh
+    from enumsol.model.cells import CellKind
     from enumsol.support.array_types import Floats, Integers, Mask
 
 #: Cosine of the angle from which on a normal of the boundary points away from an obstacle, but for rounding.
@@ -58,8 +57,8 @@ class Pair:
     gap: float | None = None
 
     @classmethod
-    def of(cls, value: Sequence[Any]) -> Pair:
-        """The pair given by two names, or by two names and a gap.
+    def of(cls, value: Sequence[Any], option: str = "pairs") -> Pair:
+        """The pair given by two names, or by two names and a gap (of a tie the largest one).
 
         Raises
         ------
@@ -69,11 +68,11 @@ class Pair:
         names = value[:2] if isinstance(value, (list, tuple)) and len(value) in (2, 3) else ()
         if not names or not all(isinstance(name, str) for name in names):
             raise InvalidArgumentError(
-                f"pairs has the entry {shown(value)}; expected two names of parts, and a gap if it is not that of the "
-                "mesh"
+                f"{option} has the entry {shown(value)}; expected two names of parts, and a gap if it is not that of "
+                "the mesh"
             )
         if names[0] == names[1]:
-            raise InvalidArgumentError(f"pairs has {names[0]} with itself; expected two different parts")
+            raise InvalidArgumentError(f"{option} has {names[0]} with itself; expected two different parts")
         gap = finite_number(value[2], f"gap of the pair {names[0]}:{names[1]}") if len(value) > 2 else None
         return cls(names[0], names[1], gap)
 
@@ -173,15 +172,16 @@ def contacts_of(body: NodalBasis, mesh: PartedMesh, options: Options, held: Supp
     found: list[tuple[ContactRows, Floats, Group]] = []
     groups: list[tuple[list[str], Pair | None]] = [(parts, None)] if parts else []
     groups += [([pair.slave], pair) for pair in pairs]
-    on, areas, taken = [], [], np.zeros(0, dtype=np.int64)
+    on: dict[str, Integers] = {}
+    areas, taken = [], np.zeros(0, dtype=np.int64)
     for names, pair in groups:
-        facets = _facets(body, mesh, names)
+        facets = _facets(body, {name: mesh.part(name) for name in names})
         rows, gaps, group = _group(
             body, mesh, names, facets, held, options.obstacle if pair is None else None, pair, taken
         )
         found.append((rows, gaps, group))
-        on.append(facets)
-        areas.append(body.on_part(facets, names[0], lambda v, _: v[0], lumped=True)[rows.nodes, 0])
+        on[names[0]] = facets
+        areas.append(body.on_part(facets, names[0], lambda _: 1.0, lumped=True)[rows.nodes, 0])
         taken = np.concatenate([taken, rows.nodes])
     rows = ContactRows(
         sp.csr_array(sp.vstack([rows.means for rows, _, _ in found])),
@@ -191,7 +191,7 @@ def contacts_of(body: NodalBasis, mesh: PartedMesh, options: Options, held: Supp
         np.arange(len(taken)),
     )
     names = list(dict.fromkeys([*parts, *(pair.slave for pair in pairs)]))
-    gaps, facets = np.concatenate([gaps for _, gaps, _ in found]), _distinct(np.concatenate(on))
+    gaps, facets = np.concatenate([gaps for _, gaps, _ in found]), _facets(body, on)
     of_groups = [group for _, _, group in found]
     return Contacts(rows, gaps, _parts(mesh, names, taken), facets, np.concatenate(areas), of_groups)
 
@@ -204,17 +204,11 @@ def _parts(mesh: PartedMesh, names: list[str], nodes: Integers) -> list[str]:
     return [names[k] for k in of_node[nodes]]
 
 
-def _facets(body: NodalBasis, mesh: PartedMesh, parts: list[str]) -> Integers:
+def _facets(body: NodalBasis, parts: Mapping[str, Integers]) -> Integers:
     """Facets of parts, each once."""
-    for part in parts:
-        body.facet_numbers(mesh.part(part), part)  # on the boundary?
-    return _distinct(np.concatenate([mesh.part(part) for part in parts]))
-
-
-def _distinct(facets: Integers) -> Integers:
-    """Facets, each once."""
-    _, first = np.unique(np.sort(facets, axis=1), axis=0, return_index=True)
-    return np.asarray(facets[np.sort(first)])
+    numbers = [body.facet_numbers(facets, part) for part, facets in parts.items()]
+    _, first = np.unique(np.concatenate(numbers), return_index=True)
+    return np.asarray(padded([*parts.values()])[np.sort(first)])
 
 
 def _group(
@@ -229,7 +223,7 @@ def _group(
 ) -> tuple[ContactRows, Floats, Group]:
     """Contact nodes with their normals on some facets, and the distances to what they face."""
     dimension = mesh.points.shape[1]
-    touching = along(facets) if dimension == 2 else np.unique(contact_nodes(dimension, facets))
+    touching = along(facets) if dimension == 2 else contact_nodes(dimension, facets)
     shared = int(np.sum(np.isin(touching, taken)))
     touching = touching[~np.isin(touching, taken)]
     if pair is None and np.all(held.fixed[touching]):
@@ -239,7 +233,7 @@ def _group(
             f"all nodes of {parts[0]} belong to another contact already; expected a boundary of its own for the pair "
             f"{pair}"
         )
-    integrals = body.on_part(facets, "contact", outward_normal, lumped=True)
+    integrals = body.on_part(facets, "contact", np.asarray, lumped=True)
     if obstacle is None:
         normals = unit_vectors(pressed(integrals[touching], touching), "normals of the boundary")
         # what averages with the other half of the body would be
@@ -265,13 +259,9 @@ def _paired(
     body: NodalBasis, mesh: PartedMesh, touching: Integers, normals: Floats, held: Supports, pair: Pair
 ) -> tuple[ContactRows, Floats, Group]:
     """Nodes that face the other part of a pair, relative to it."""
-    facets = _facets(body, mesh, [pair.master])
-    apart = ~np.isin(touching, facets)  # a node of both, as at the tip of a crack, is in contact with itself
+    apart = ~np.isin(touching, mesh.part(pair.master))  # of both, as at the tip of a crack: in contact with itself
     touching, normals = touching[apart], normals[apart]
-    boundary = boundary_facets(mesh.points.shape[1], mesh.cells)
-    others = boundary[np.isin(facet_rows(boundary, facets, facets.shape[1]), -1)]
-    outward = body.on_part(facets, pair.master, outward_normal)
-    found, weights, distances = faced(mesh.points, touching, normals, facets, outward, others)
+    found, weights, distances = facing(body, mesh, touching, normals, pair.master)
     if not len(distances):
         raise InvalidArgumentError(
             f"{pair.slave} of the pair {pair} has no node that faces a facet of {pair.master} along its normal; "
@@ -285,9 +275,31 @@ def _paired(
     return nodes, gaps[nodes.kept], Group([pair.slave], pair, normals[nodes.kept], len(nodes.nodes), missed)
 
 
+def facing(
+    body: NodalBasis, mesh: PartedMesh, nodes: Integers, normals: Floats, master: str
+) -> tuple[Mask, sp.csr_array, Floats]:
+    """The points of a part that nodes face along their normals, as in `faced`."""
+    facets = _facets(body, {master: mesh.part(master)})
+    boundary = boundary_facets(mesh.points.shape[1], mesh.cells)
+    others = boundary[np.isin(facet_rows(mesh.points.shape[1], boundary, facets), -1)]
+    outward = body.on_part(facets, master, np.asarray)
+    return faced(mesh.points, nodes, normals, facets, outward, others)
+
+
+def facing_normals(body: NodalBasis, mesh: PartedMesh, part: str) -> tuple[Integers, Floats]:
+    """All nodes of a part, and the means of the normals of the facets around them, which corners have as well."""
+    facets = _facets(body, {part: mesh.part(part)})
+    of_facets = unit_vectors(body.on_part(facets, part, np.asarray)[facets].sum(axis=1), f"normals of {part}")
+    sums = np.zeros(mesh.points.shape)
+    np.add.at(sums, facets.ravel(), np.repeat(of_facets, facets.shape[1], axis=0))
+    nodes = np.unique(facets)
+    return nodes, unit_vectors(sums[nodes], f"normals of {part}")
+
+
 def along(edges: Integers) -> Integers:
     """Nodes of edges (k, 2) or (k, 3), each line of edges from one end to the other; closed lines from any node."""
-    pairs = edges if edges.shape[1] == 2 else np.concatenate([edges[:, [0, 2]], edges[:, [2, 1]]])
+    lines = [lines_along(nodes) for _, nodes in by_kind(1, edges)]
+    pairs = np.concatenate([part[:, k : k + 2] for part in lines for k in range(part.shape[1] - 1)])
     beside: dict[int, list[int]] = {}
     for one, two in pairs.tolist():
         beside.setdefault(one, []).append(two)
@@ -333,27 +345,26 @@ def faced(
         All other facets on the boundary of bodies: a node is inside the other body where none of them is between.
     """
     tolerance = _TOUCHING * float(np.max(np.ptp(points, axis=0)))
-    targets, between = (_Facets.of(points, rows) for rows in (facets, others))
+    targets, between = (_Facets.all_of(points, rows) for rows in (facets, others))
     away = outward[facets].sum(axis=1)
     found = np.zeros(len(nodes), dtype=bool)
     gaps: list[float] = []
     rows, columns, data = [], [], []
     for k, (node, normal) in enumerate(zip(nodes, normals, strict=True)):
-        at, gap, row = targets.on_line(points[node], normal, tolerance)
-        for hit in np.argsort(np.abs(gap), kind="stable"):
-            if away[row[hit]] @ normal >= 0:
+        met = [hit for own in targets for hit in own.on_line(points[node], normal, tolerance)]
+        for gap, row, values in sorted(met, key=lambda hit: abs(hit[0])):
+            if away[row] @ normal >= 0:
                 continue
-            if gap[hit] < -tolerance:
-                _, crossed, _ = between.on_line(points[node], normal, tolerance)
-                if np.any((crossed < -tolerance) & (crossed > gap[hit] + tolerance)):
+            if gap < -tolerance:
+                crossed = np.array([hit[0] for own in between for hit in own.on_line(points[node], normal, tolerance)])
+                if np.any((crossed < -tolerance) & (crossed > gap + tolerance)):
                     continue
-            values = targets.values(at[hit][None])[:, 0]
             values[np.abs(values) < _AT_NODE] = 0.0
             kept = np.flatnonzero(values)
             rows.append(np.full(len(kept), len(gaps)))
-            columns.append(facets[row[hit], kept])
+            columns.append(facets[row, kept])
             data.append(values[kept] / values.sum())
-            gaps.append(0.0 if abs(gap[hit]) <= tolerance else float(gap[hit]))
+            gaps.append(0.0 if abs(gap) <= tolerance else gap)
             found[k] = True
             break
     if not gaps:
@@ -364,55 +375,42 @@ def faced(
 
 @dataclass(frozen=True)
 class _Facets:
-    """Facets to be met by lines.
+    """Facets of one kind to be met by lines.
 
     Attributes
     ----------
-    element : of scikit-fem
-    triangle : whether coordinates in the reference add up to at most one, as on an edge
-    centre : (d - 1,) array
-        Of the reference.
+    kind : CellKind
+    rows : (m,) int array
+        Which of the facets they are.
     places : (m, c, d) array
         Of the nodes.
     """
 
-    element: Element
-    triangle: bool
-    centre: Floats
+    kind: CellKind
+    rows: Integers
     places: Floats
 
     @classmethod
-    def of(cls, points: Floats, facets: Integers) -> _Facets:
-        """Facets of these nodes, edges or facets of solids."""
-        import skfem  # as in nodal_basis
+    def all_of(cls, points: Floats, facets: Integers) -> list[_Facets]:
+        """Facets of these nodes, edges or facets of solids, by kinds."""
+        d = points.shape[1] - 1
+        kinds = by_kind(d, facets) if len(facets) else []
+        return [cls(KINDS[d, nodes.shape[1]], rows, points[nodes]) for rows, nodes in kinds]
 
-        if points.shape[1] == 2:
-            element = {2: skfem.ElementLineP1, 3: skfem.ElementLineP2}[facets.shape[1]]()
-            return cls(element, True, np.array([0.5]), points[facets])
-        kind = KINDS[2, facets.shape[1]]
-        triangle = kind.corners == 3
-        centre = np.full(2, 1 / 3 if triangle else 0.5)
-        return cls(getattr(skfem, kind.element)(), triangle, centre, points[facets])
-
-    def values(self, places: Floats) -> Floats:
-        """Shape functions (c, q) at places (q, d - 1) of the reference."""
-        every = (self.element.lbasis(places.T, i)[0] for i in range(self.places.shape[1]))
-        return np.stack([np.broadcast_to(values, len(places)) for values in every])
-
-    def slopes(self, places: Floats) -> Floats:
-        """Their derivatives (c, d - 1, q)."""
-        every = (self.element.lbasis(places.T, i)[1] for i in range(self.places.shape[1]))
-        return np.stack([np.broadcast_to(slopes, places.T.shape) for slopes in every])
+    @cached_property
+    def centre(self) -> Floats:
+        """Of the reference, (d - 1,)."""
+        return np.asarray(self.kind.places[: self.kind.corners].mean(axis=0))
 
     def inside(self, places: Floats) -> Mask:
         """Which places of the reference belong to the facet, but for rounding."""
-        sums = places.sum(axis=1) if self.triangle else np.max(places, axis=1)
+        sums = places.sum(axis=1) if self.kind.form == "triangle" else np.max(places, axis=1)
         return np.asarray(np.all(places >= -_BEYOND, axis=1) & (sums <= 1 + _BEYOND))
 
     @cached_property
     def centres(self) -> Floats:
         """Centres of the facets, (m, d)."""
-        return np.asarray(np.einsum("m,fmd->fd", self.values(self.centre[None])[:, 0], self.places))
+        return np.asarray(np.einsum("m,fmd->fd", self.kind.values(self.centre[None])[:, 0], self.places))
 
     @cached_property
     def reach(self) -> Floats:
@@ -420,8 +418,8 @@ class _Facets:
         far = np.max(np.linalg.norm(self.places - self.centres[:, None], axis=2), axis=1, initial=0.0)
         return np.asarray(1.5 * far)
 
-    def on_line(self, point: Floats, normal: Floats, tolerance: float) -> tuple[Floats, Floats, Integers]:
-        """Places in facets where a line meets them, by Newton's method, distances along it, and which facets."""
+    def on_line(self, point: Floats, normal: Floats, tolerance: float) -> list[tuple[float, int, Floats]]:
+        """Distances along a line at which it meets facets, by Newton's method, which facets, and shape functions."""
         offset = self.centres - point
         ahead = offset @ normal
         across = np.linalg.norm(offset - ahead[:, None] * normal, axis=1)
@@ -430,12 +428,12 @@ class _Facets:
         direction = np.broadcast_to(-normal[:, None], (len(near), len(normal), 1))
 
         def left() -> Floats:
-            reached = np.einsum("mq,qmd->qd", self.values(at), facets)
+            reached = np.einsum("mq,qmd->qd", self.kind.values(at), facets)
             return np.asarray(reached - point - gap[:, None] * normal)
 
         with np.errstate(all="ignore"):  # what diverges is not taken
             for _ in range(_STEPS if len(near) else 0):
-                tangents = np.einsum("mkq,qmd->qdk", self.slopes(at), facets)
+                tangents = np.einsum("mkq,qmd->qdk", self.kind.slopes(at), facets)
                 J, off = np.concatenate([tangents, direction], axis=2), left()
                 # where the line is parallel to the facet, or nearly, it goes astray
                 flat = ~(np.abs(np.linalg.det(J)) > _AT_NODE * np.prod(np.linalg.norm(J, axis=1), axis=1))
@@ -445,4 +443,5 @@ class _Facets:
                 if np.max(np.abs(step[:, :-1])) < _CONVERGED:
                     break
             met = np.flatnonzero(self.inside(at) & (np.linalg.norm(left(), axis=1) <= tolerance))
-        return at[met], gap[met], near[met]
+        rows = self.rows[near[met]].tolist()
+        return list(zip(gap[met].tolist(), rows, self.kind.values(at[met]).T, strict=True))

@@ -17,10 +17,11 @@ from typing import TYPE_CHECKING, Any, cast
 import numpy as np
 
 from enumsol.errors import InvalidArgumentError, MissingDependencyError
+from enumsol.fem.cell_blocks import as_cells_have, joined
 from enumsol.fem.deck_meshes import DeckMesh, deck_mesh
 from enumsol.fem.file_counts import refuse_partial
 from enumsol.fem.meshes import ALL, SAME, PartedMesh, SolidMesh, positions
-from enumsol.model.cells import KINDS, TRIANGLES, as_quadrilaterals, boundary_facets, facet_rows, numbers_of_nodes
+from enumsol.model.cells import KINDS, boundary_facets, numbers_of_nodes, padded
 from enumsol.support.arguments import file_path, shown
 from enumsol.support.array_types import Floats, Integers, NDArray
 from enumsol.support.files import DAMAGE, unreadable
@@ -42,9 +43,11 @@ _DECK = ".inp"
 def read_mesh(source: str | os.PathLike[str] | Any, groups: str | None = None) -> PartedMesh:
     """Mesh of a body in 2D or 3D with its named parts, from a file that meshio reads or from a meshio.Mesh.
 
-    In 2D the cells are triangles and quadrilaterals, of first or of second order (6, 8 or 9 nodes), in 3D tetrahedra or
-    hexahedra, of first or of second order (10, 20 or 27 nodes); those of 20 nodes are completed to 27, with the last
-    numbers for the new nodes. The third coordinate of a plane mesh is left out; it must be the same everywhere.
+    In 2D the cells are triangles and quadrilaterals, of first or of second order (6, 8 or 9 nodes), in 3D tetrahedra,
+    wedges and hexahedra, of first or of second order (10; 15 or 18; 20 or 27 nodes), all of them in one mesh where they
+    share whole facets. Wedges of 15 nodes are completed to 18 and hexahedra of 20 to 27, with the last numbers for the
+    new nodes. Quadrilaterals and hexahedra (not of 27 nodes) that name nodes twice become the triangles, wedges or
+    tetrahedra that they are. The third coordinate of a plane mesh is left out; it must be the same everywhere.
 
     Parts are the lines (in 3D triangles or quadrilaterals) that the file holds, by the names of their cell sets or
     groups (a group without a name gets its number); without any groups all of them are named "boundary". Cells of the
@@ -184,34 +187,39 @@ def _parted(mesh: meshio.Mesh | DeckMesh, groups: str | None, dimension: int | N
     if dimension is None:
         spatial = any(kind.startswith(("tetra", "hexa", "wedge", "pyramid", "polyhedron")) for kind in kinds)
         dimension = 3 if spatial else 2
-    bodies, facet = body_kinds(kinds, dimension)
+    bodies, sides = body_kinds(kinds, dimension)
     types, labels = (tuple(mesh.types), mesh.labels(bodies)) if isinstance(mesh, DeckMesh) else ((), None)
-    cells = body_cells(mesh, bodies)
-    used = np.unique(cells)
+    blocks = [np.asarray(block.data).astype(np.int64) for block in mesh.cells if block.type in bodies]
+    used = np.unique(np.concatenate([block.ravel() for block in blocks]))
     if len(used) and not 0 <= used[0] <= used[-1] < len(mesh.points):
         raise InvalidArgumentError(
             f"the cells name nodes from {used[0]} to {used[-1]}; expected them in 0 .. {len(mesh.points) - 1}"
         )
     points = np.asarray(mesh.points)[used]
     nodes = positions(points, 3) if dimension == 3 else _plane(points)
+    nodes, cells = joined(nodes, [np.searchsorted(used, block) for block in blocks], labels)
+    # a collapsed cell may name nodes between corners that it has no more
+    used, kept = np.concatenate([used, np.full(len(nodes) - len(used), -1)]), np.unique(cells)
+    nodes, inside, of_file = nodes[kept], np.searchsorted(kept, cells), used[kept]
     number = np.full(len(mesh.points), -1)
-    number[used] = np.arange(len(used))
-    inside = number[cells]
+    number[of_file[of_file >= 0]] = np.flatnonzero(of_file >= 0)
     if dimension == 3:
-        nodes, inside = solid_cells(nodes, inside, labels)
+        from enumsol.fem.solid_problems import solid_mesh  # not for plane meshes
+
+        nodes, inside = solid_mesh(nodes, inside, numbers_of_nodes(3), labels)
     sets = {name: kept for name, rows in _node_sets(mesh).items() if len(kept := _inside(number, rows, name))}
-    facets = {name: _inside(number, rows, name) for name, rows in _named(mesh, facet, groups, dimension).items()}
+    facets = {name: _inside(number, rows, name) for name, rows in _named(mesh, sides, groups, dimension).items()}
     lost = [name for name, rows in facets.items() if np.any(rows < 0)]
     if lost:
         raise InvalidArgumentError(f"facets of {lost[0]} have nodes of no cell; expected facets on the boundary")
-    if facet == "quad8":
-        facets = {name: with_centres(rows, inside, name) for name, rows in facets.items()}
-    found, sets = facets_of_sets(dimension, inside, sets, len(used))
+    if "quad8" in sides and dimension == 3:
+        facets = {name: as_cells_have(rows, inside, name) for name, rows in facets.items()}
+    found, sets = facets_of_sets(dimension, inside, sets, int(np.sum(of_file >= 0)))
     facets = {**found, **facets} if isinstance(mesh, DeckMesh) else facets or found
     if not facets:
         raise InvalidArgumentError(
-            f"the mesh has no contact facets: no {facet} cells on its boundary; "
-            f"expected {facet} cells, best in groups with names ({GROUPS_ONLY} its parts need some, too)"
+            f"the mesh has no contact facets: no {' or '.join(sides)} cells on its boundary; "
+            f"expected {' or '.join(sides)} cells, best in groups with names ({GROUPS_ONLY} its parts need some, too)"
         )
     sets = {name: rows[rows >= 0] for name, rows in sets.items() if np.any(rows >= 0)}
     made = PartedMesh if dimension == 2 else SolidMesh
@@ -249,18 +257,18 @@ def _node_sets(mesh: meshio.Mesh) -> dict[str, Integers]:
     for tag, names in _families(mesh, _FAMILIES[1]).items():
         of_family = np.flatnonzero(np.asarray(mesh.point_data[_FAMILIES[1]]) == tag)
         sets |= {name: np.union1d(sets.get(name, of_family), of_family) for name in names}
-    vertices = _rows(mesh, "vertex")
+    vertices = _rows(mesh, ["vertex"])
     points = {name: vertices[rows].ravel() for name, rows in _grouped(mesh, ["vertex"], None, 0).items()}
     return sets | points
 
 
-def _named(mesh: meshio.Mesh, facet: str, groups: str | None, dimension: int) -> dict[str, Integers]:
+def _named(mesh: meshio.Mesh, sides: list[str], groups: str | None, dimension: int) -> dict[str, Integers]:
     """Facets by the name of their group, in the numbers of the file."""
     if groups is not None and groups not in mesh.cell_data:
         known = ", ".join(mesh.cell_data) or "none"
         raise InvalidArgumentError(f"groups is {shown(groups)}; expected the name of cell data (found {known})")
-    every = _rows(mesh, facet)
-    named = {name: every[rows] for name, rows in _grouped(mesh, [facet], groups, dimension - 1).items()}
+    every = _rows(mesh, sides)
+    named = {name: every[rows] for name, rows in _grouped(mesh, sides, groups, dimension - 1).items()}
     return named if named or not len(every) or _node_sets(mesh) else {ALL: every}
 
 
@@ -287,10 +295,10 @@ def _grouped(mesh: meshio.Mesh, kinds: Sequence[str], groups: str | None, dimens
     return {name: np.concatenate(parts) for name, parts in named.items()}
 
 
-def _rows(mesh: meshio.Mesh, kind: str) -> Integers:
-    """Nodes of all cells of a kind, in the numbers of the file."""
-    parts = [np.asarray(block.data).astype(np.int64) for block in mesh.cells if block.type == kind]
-    return np.concatenate(parts) if parts else np.zeros((0, 1), dtype=np.int64)
+def _rows(mesh: meshio.Mesh, kinds: Sequence[str]) -> Integers:
+    """Nodes of all cells of some kinds, in the numbers of the file; those of fewer repeat their last."""
+    parts = [np.asarray(block.data).astype(np.int64) for block in mesh.cells if block.type in kinds]
+    return padded(parts) if parts else np.zeros((0, 1), dtype=np.int64)
 
 
 def _tags(
@@ -318,119 +326,61 @@ def _families(mesh: object, name: str) -> dict[int, list[str]]:
     return {int(tag): [str(group) for group in members] for tag, members in getattr(mesh, name, {}).items()}
 
 
-#: By dimension: the facets of each kind of cell. Hexahedra with 20 nodes become such with 27.
-FACET_OF = {d: {kind.file_name: kind.file_facets for (e, _), kind in KINDS.items() if e == d} for d in (2, 3)}
-FACET_OF[3]["hexahedron20"] = "quad8"
-#: Nodes of a quadrilateral.
-_NODES = {KINDS[2, nodes].file_name: nodes for nodes in TRIANGLES}
-#: Kinds that may come together: quadrilaterals with the triangles that they may be.
-_TOGETHER = [{KINDS[2, nodes].file_name, KINDS[2, len(own)].file_name} for nodes, own in TRIANGLES.items()]
+#: By dimension: the facets of each kind of cell. Hexahedra with 20 nodes become such with 27, wedges with 15 with 18.
+FACET_OF = {
+    d: {
+        kind.file_name: list(dict.fromkeys(KINDS[d - 1, len(side)].file_name for side in kind.sides))
+        for (e, _), kind in KINDS.items()
+        if e == d
+    }
+    for d in (2, 3)
+}
+# collapsed ones have triangles, too
+FACET_OF[3] |= {"hexahedron": ["quad", "triangle"], "hexahedron20": ["quad8", "triangle6"]}
+FACET_OF[3]["wedge15"] = ["triangle6", "quad8"]
 #: By dimension: other cells that files may hold.
 _IGNORED = {2: ("vertex",), 3: ("vertex", "line")}
-_EXPECTED = {
-    2: "triangle and quad with line, or triangle6 and either quad8 or quad9 with line3",
-    3: f"one of {', '.join(FACET_OF[3])} with {', '.join(FACET_OF[3].values())}",
-}
-_BODIES = {2: "triangles or quadrilaterals", 3: "tetrahedra or hexahedra"}
-#: Facets of a hexahedron.
-_SIDES = KINDS[3, 27].facets
+_EXPECTED = {d: ", ".join(cells) for d, cells in FACET_OF.items()}
+_BODIES = {2: "triangles or quadrilaterals", 3: "tetrahedra, wedges or hexahedra"}
 #: Why gmsh leaves cells out.
 GROUPS_ONLY = "gmsh writes only what is in physical groups, if there are any:"
 #: What makes gmsh write other cells.
 _HINTS = {
-    "pyramid": " (pyramids join tetrahedra to hexahedra: mesh all of the body by one of them)",
-    "wedge": " (wedges are extruded triangles: recombine these to quadrilaterals, or do not recombine the layers)",
+    "pyramid": " (pyramids join tetrahedra to hexahedra: mesh all of a body by one of them)",
     "": " (for cells of higher order set Mesh.ElementOrder = 2 in gmsh)",
 }
-_APART = " (tetrahedra and hexahedra fit together by pyramids only: mesh all of the body by one of them)"
 
 
-def body_kinds(kinds: list[str], dimension: int) -> tuple[list[str], str]:
-    """Kinds of the cells of the body, and of its facets.
+def body_kinds(kinds: list[str], dimension: int) -> tuple[list[str], list[str]]:
+    """Kinds of the cells of the body, and those that its facets may be of.
 
     Raises
     ------
     InvalidArgumentError
-        There is no body, its cells do not fit together, or there are other cells.
+        There is no body, or there are other cells.
     """
-    facet_of = FACET_OF[dimension]
+    facets_of = FACET_OF[dimension]
     others = [kind for kind in kinds if not kind.startswith(_IGNORED[dimension])]
-    bodies = [kind for kind in others if kind in facet_of]
-    strange = [kind for kind in others if kind not in facet_of and kind not in facet_of.values()]
-    if strange or (len(bodies) > 1 and set(bodies) not in _TOGETHER):
-        hint = next((text for start, text in _HINTS.items() if any(kind.startswith(start) for kind in strange)), "")
-        hint = hint or (_APART if dimension == 3 else "")
+    bodies = [kind for kind in others if kind in facets_of]
+    every = {kind for sides in facets_of.values() for kind in sides}
+    strange = [kind for kind in others if kind not in facets_of and kind not in every]
+    if strange:
+        hint = next(text for start, text in _HINTS.items() if any(kind.startswith(start) for kind in strange))
         raise InvalidArgumentError(
-            f"the mesh has cells of type {' and '.join(strange or bodies)}; expected {_EXPECTED[dimension]}{hint}"
+            f"the mesh has cells of type {' and '.join(strange)}; expected some of {_EXPECTED[dimension]}{hint}"
         )
     if not bodies:
         raise InvalidArgumentError(
             f"the mesh has no {_BODIES[dimension]}; expected a body in {dimension}D ({GROUPS_ONLY} the body needs one, "
             "too)"
         )
-    facet = facet_of[bodies[0]]
-    other = [kind for kind in others if kind not in (*bodies, facet)]
+    sides = list(dict.fromkeys(kind for body in bodies for kind in facets_of[body]))
+    other = [kind for kind in others if kind not in (*bodies, *sides)]
     if other:
         raise InvalidArgumentError(
-            f"the mesh has {other[0]} cells beside {' and '.join(bodies)}; expected facets of type {facet}"
+            f"the mesh has {other[0]} cells beside {' and '.join(bodies)}; expected facets of type {' or '.join(sides)}"
         )
-    return bodies, facet
-
-
-def body_cells(mesh: meshio.Mesh, bodies: list[str]) -> Integers:
-    """The cells (M, k) of these kinds, as `PartedMesh` has them, by the numbers of the file."""
-    blocks = [(block.type, np.asarray(block.data).astype(np.int64)) for block in mesh.cells if block.type in bodies]
-    nodes = next((_NODES[kind] for kind in bodies if kind in _NODES), None)
-    parts = [
-        as_quadrilaterals(rows, nodes) if nodes is not None and kind not in _NODES else rows for kind, rows in blocks
-    ]
-    return np.concatenate(parts)
-
-
-def solid_cells(points: Floats, cells: Integers, labels: Integers | None = None) -> tuple[Floats, Integers]:
-    """Points and cells of a body in 3D, tetrahedra turned and hexahedra of 20 nodes completed to 27.
-
-    Raises
-    ------
-    InvalidArgumentError
-        As `solid_mesh` does.
-    """
-    from enumsol.fem.solid_problems import solid_mesh  # not for plane meshes
-
-    if cells.shape[1] == 20:
-        points, cells = completed(points, cells)
-    return solid_mesh(points, cells, numbers_of_nodes(3), labels)
-
-
-def completed(points: Floats, cells: Integers) -> tuple[Floats, Integers]:
-    """Hexahedra with 20 nodes as such with 27 of the same shape; the new nodes have the last numbers.
-
-    On facets with eight nodes a uniform pressure pulls at the corners; on those with nine it presses on every node.
-    """
-    corners, between = cells[:, :8], cells[:, 8:]
-    sides = np.sort(corners[:, _SIDES[:, :4]], axis=2).reshape(-1, 4)
-    _, first, number = np.unique(sides, axis=0, return_index=True, return_inverse=True)
-    at = points[corners][:, _SIDES[:, :4]].sum(axis=2), points[between][:, _SIDES[:, 4:8] - 8].sum(axis=2)
-    centres = (0.5 * at[1] - 0.25 * at[0]).reshape(-1, 3)[first]
-    inside = 0.25 * (points[between].sum(axis=1) - points[corners].sum(axis=1))
-    of_sides = len(points) + number.reshape(-1, 6)
-    of_cells = len(points) + len(centres) + np.arange(len(cells))
-    return np.concatenate([points, centres, inside]), np.concatenate([cells, of_sides, of_cells[:, None]], axis=1)
-
-
-def with_centres(facets: Integers, cells: Integers, name: str) -> Integers:
-    """Facets (k, 8) of hexahedra that have been completed, with the nodes (k, 9) that they have now.
-
-    Raises
-    ------
-    InvalidArgumentError
-        One is no facet of a cell.
-    """
-    every = cells[:, _SIDES].reshape(-1, 9)
-    rows = facet_rows(facets, every, 4)
-    if -1 in rows:
-        raise InvalidArgumentError(f"{name} has facets that belong to no cell; expected facets of the body")
-    return np.asarray(every[rows])
+    return bodies, sides
 
 
 def facets_of_sets(

@@ -11,13 +11,15 @@ import numpy as np
 import scipy.sparse as sp
 
 from enumsol.errors import InvalidArgumentError
-from enumsol.fem import conditions
-from enumsol.fem.bases import NodalBasis
+from enumsol.fem import bodies, conditions
+from enumsol.fem.bases import NodalBasis, isotropic
+from enumsol.fem.bodies import BodyPiece
 from enumsol.fem.conditions import FRICTION, Options
 from enumsol.fem.contacts import Contacts, Group
+from enumsol.fem.joints import Joints
 from enumsol.fem.meshes import PartedMesh, unit_vectors
 from enumsol.fem.restrained import Body, Supports, axes_of, problem_of
-from enumsol.model.cells import KINDS, boundary_facets, by_kind, facet_outlines
+from enumsol.model.cells import KINDS, boundary_facets, by_kind, facet_outlines, lines_along
 from enumsol.model.mass import consistent_mass
 from enumsol.model.mesh import BodyMesh
 from enumsol.model.problem import given_friction
@@ -42,7 +44,7 @@ if TYPE_CHECKING:
 
 #: Options that say what a part of the boundary is for.
 _USES = (
-    *("contact", "clamp", "symmetry", "displacement", "displacement_slope", "spring"),
+    *("contact", "clamp", "symmetry", "displacement", "displacement_slope", "transform", "spring", "node_spring"),
     *("load", "load_slope", "pressure", "pressure_slope", "force", "force_slope"),
 )
 
@@ -57,10 +59,12 @@ class Scene:
     options : Options
     body : NodalBasis
     held : Supports
+    joints : Joints
     contacts : Contacts
     forces, slope : (N, d) arrays
         On all nodes, and their derivatives with respect to alpha [force].
-    springs : (d N, d N) csc_array
+    springs : (m, m) csc_array
+        Of all displacements, those of reference points after those of nodes.
     lame : (2,) or (M, 2) array
     pieces : list of BodyPiece
         The connected bodies.
@@ -74,12 +78,13 @@ class Scene:
     options: Options
     body: NodalBasis
     held: Supports
+    joints: Joints
     contacts: Contacts
     forces: Floats
     slope: Floats
     springs: sp.csc_array
     lame: Floats
-    pieces: list[conditions.BodyPiece]
+    pieces: list[BodyPiece]
     masses: Floats | None = None
     notes: list[str] = field(default_factory=list)
 
@@ -125,12 +130,25 @@ class Scene:
 
     @cached_property
     def hold(self) -> sp.csc_array:
-        """A stiffness of supports and springs, (d N, d N)."""
-        return conditions.holding(self.held, self.springs)
+        """A stiffness of supports, equations and springs, (m, m)."""
+        return bodies.holding(self.held, self.springs, self.joints.rows)
+
+    @cached_property
+    def moving(self) -> list[BodyPiece]:
+        """The bodies, those that equations or springs join as one."""
+        links = sp.csr_array(sp.vstack([self.joints.rows, self.joints.springs]))
+        return bodies.joined(self.pieces, self.mesh, links) if links.nnz else self.pieces
 
     def uses(self, part: str) -> list[str]:
         """Uses of a part of the boundary, as the options name it."""
         found = [name for name in _USES if part in _names(getattr(self.options, name))]
+        found += [
+            f"{what} of {name}"
+            for what in ("rigid", "coupling")
+            for name, parts in (getattr(self.options, what) or {}).items()
+            if part in _names(parts)
+        ]
+        found += [f"tie {own[0]}:{own[1]}" for own in self.options.tie if part in own[:2]]
         pairs = [group.pair for group in self.contacts.groups if group.pair is not None]
         found += [f"contact nodes of the pair {pair}" for pair in pairs if part == pair.slave]
         return found + [f"facets of the pair {pair}" for pair in pairs if part == pair.master]
@@ -143,6 +161,7 @@ class Scene:
             "bodies": _bodies(self),
             "material": _material(self),
             "parts": _parts(self),
+            "joints": self.joints.said,
             "loads": _loads(self),
             "contact": _contact(self),
             "note": self.notes,
@@ -173,10 +192,22 @@ class Scene:
             surface, more = outward(contacts.facets, mesh.cells), {"areas": contacts.areas}
         gaps, coefficients = self.gaps, self.coefficients
         modes, bound = self._rigid_modes()
-        stiffness = sp.csc_array(self.body.stiffness(*self.lame.T) + self.springs)
+        elastic = self.body.stiffness(isotropic(self.lame, self.body.components))
+        stiffness = sp.csc_array(self.joints.padded(elastic) + self.springs)
+        forces, slope = (
+            np.append(own, more) for own, more in ((self.forces, self.joints.forces), (self.slope, self.joints.slope))
+        )
+        named = self.joints.references.named
         axes = _axes(nodes, self.options.axis, self.dimension)
         problem = problem_of(
-            Body(stiffness, self.forces.ravel(), self.slope.ravel() if np.any(self.slope) else None, supports),
+            Body(
+                stiffness,
+                forces,
+                slope if np.any(slope) else None,
+                supports,
+                equations=self.joints.equations,
+                named=named,
+            ),
             nodes,
             axes,
             modes=modes,
@@ -192,20 +223,20 @@ class Scene:
         return afresh(problem, notes=tuple(self.notes))
 
     def _mass(self) -> sp.csc_array | None:
-        """Consistent mass before supports, (d N, d N), if it is not uniform or was given."""
+        """Consistent mass before supports, (m, m), if it is not uniform or was given."""
         if self.masses is None:
             return None
         of_nodes = consistent_mass(self.mesh.points, self.mesh.cells, self.masses)
-        return sp.csc_array(sp.kron(of_nodes, sp.eye_array(self.dimension)))
+        return self.joints.padded(sp.csc_array(sp.kron(of_nodes, sp.eye_array(self.dimension))))
 
     def _rigid_modes(self) -> tuple[Floats | None, float | None]:
         """Rigid motions that nothing holds, if a bound for them is given, and the bound; None: the default."""
-        bound, about = self.options.max_rigid_displacement, (self.pieces, self.mesh.points, self.hold)
+        bound, about = self.options.max_rigid_displacement, (self.moving, self.mesh.points, self.hold)
         if bound is None:
-            conditions.check_held(*about)
+            bodies.check_held(*about)
             return None, None
         largest = None if bound == "auto" else positive_number(bound, "max_rigid_displacement")
-        modes = conditions.rigid_modes_of(*about)
+        modes = bodies.rigid_modes_of(*about)
         return modes, None if modes is None else largest
 
     def plot(self, *, units: tuple[str, str] | None = None, file: str | os.PathLike[str] | None = None) -> Any:
@@ -285,17 +316,14 @@ def _mesh(scene: Scene) -> list[str]:
 
 
 def _bodies(scene: Scene) -> list[str]:
-    mesh = scene.mesh
-    sizes = np.empty(len(mesh.cells))
-    for block in scene.body.blocks:
-        sizes[block.rows] = np.sum(block.basis.dx, axis=1)
+    mesh, sizes = scene.mesh, scene.body.sizes
 
     def size(rows: Integers) -> str:
         what = "area" if scene.dimension == 2 else "volume"
         return f"{counted(len(rows), 'cell')}, {what} {np.sum(sizes[rows]):.6g}"
 
     lines, said = [], set()
-    for piece in scene.pieces:
+    for piece in scene.moving:
         free = piece.free_motions(mesh.points, scene.hold)
         modes = f"{counted(free, 'rigid mode')} that nothing but contact holds" if free else "held"
         lines.append(f"{piece.name}: {size(np.flatnonzero(np.all(piece.nodes[mesh.cells], axis=1)))}, {modes}")
@@ -314,7 +342,7 @@ def _parts(scene: Scene) -> list[str]:
     lines = []
     for name, facets in scene.mesh.facets.items():
         try:
-            size = f"{what} {np.sum(plain.on_part(facets, name, lambda v, _: v[0], lumped=True)):.6g}"
+            size = f"{what} {np.sum(plain.on_part(facets, name, lambda _: 1.0)[:, 0]):.6g}"
         except InvalidArgumentError:
             size = "not on the boundary"
         lines.append(f"{name}: {counted(len(facets), 'facet')}, {size}; {', '.join(scene.uses(name)) or 'not used'}")
@@ -327,9 +355,14 @@ def _parts(scene: Scene) -> list[str]:
 
 
 def _loads(scene: Scene) -> list[str]:
-    lines = [f"resultant {_resultant(scene.forces)}"]
-    if np.any(scene.slope):
-        lines.append(f"times alpha: resultant {_resultant(scene.slope)}")
+    known = scene.joints.references
+    every = [
+        np.concatenate([own, more.reshape(-1, known.each)[:, : scene.dimension]])
+        for own, more in ((scene.forces, scene.joints.forces), (scene.slope, scene.joints.slope))
+    ]
+    lines = [f"resultant {_resultant(every[0])}"]
+    if np.any(every[1]):
+        lines.append(f"times alpha: resultant {_resultant(every[1])}")
     return lines
 
 
@@ -373,17 +406,16 @@ def _drawn(scene: Scene, units: tuple[str, str] | None = None) -> Figure:
     figure: Figure = new_figure(figsize=(8.0, 5.6))
     ax: Any = figure.add_subplot(**({"projection": "3d"} if d == 3 else {}))
     if d == 2:
-        for _, cells in by_kind(2, mesh.cells):
-            outlines = mesh.points[cells[:, KINDS[2, cells.shape[1]].outline]]
-            ax.add_collection(PolyCollection(list(outlines), facecolor=_BODY, edgecolor=_EDGE, linewidth=0.5))
+        outlines = mesh.points[facet_outlines(mesh.cells)]
+        ax.add_collection(PolyCollection(list(outlines), facecolor=_BODY, edgecolor=_EDGE, linewidth=0.5))
     else:
         faces = mesh.points[facet_outlines(boundary_facets(3, mesh.cells))]
         ax.add_collection3d(Poly3DCollection(list(faces), facecolor=_BODY, edgecolor=_EDGE, linewidth=0.3, alpha=0.25))
     for k, (name, facets) in enumerate(mesh.facets.items()):
         label = f"{name}: {', '.join(scene.uses(name)) or 'not used'}"
         if d == 2:
-            along = facets if facets.shape[1] == 2 else facets[:, [0, 2, 1]]
-            ax.add_collection(LineCollection(list(mesh.points[along]), color=f"C{k}", linewidth=3, label=label))
+            along = mesh.points[lines_along(facets)]
+            ax.add_collection(LineCollection(list(along), color=f"C{k}", linewidth=3, label=label))
         else:
             sides = list(mesh.points[facet_outlines(facets)])
             ax.add_collection3d(Poly3DCollection(sides, facecolor=f"C{k}", alpha=0.35, label=label))
@@ -417,7 +449,7 @@ def _edges(dimension: int, cells: Integers) -> Integers:
     if dimension == 3:
         outlines = facet_outlines(facets)
         return np.stack([outlines, np.roll(outlines, -1, axis=1)], axis=2).reshape(-1, 2)
-    along = facets if facets.shape[1] == 2 else facets[:, [0, 2, 1]]
+    along = lines_along(facets)
     return np.concatenate([along[:, k : k + 2] for k in range(along.shape[1] - 1)])
 
 

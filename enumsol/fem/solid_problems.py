@@ -1,6 +1,6 @@
 """From a mesh of a body in 3D to its contact problem (theory, section 11.6).
 
-Bodies of P1 tetrahedra or Q1 hexahedra: their stiffness by scikit-fem, body forces and tractions; the contact surface,
+Bodies of P1 tetrahedra or Q1 hexahedra: their stiffness, body forces and tractions; the contact surface,
 where multipliers live, local axes and the return operator r_h. Degrees of freedom before constraints are
 ``3 node + component``.
 """
@@ -16,9 +16,9 @@ import scipy.sparse as sp
 
 from enumsol.errors import InvalidArgumentError, InvalidProblemError
 from enumsol.fem import meshes, restrained
-from enumsol.fem.bases import FLAT, nodal_basis
+from enumsol.fem.bases import FLAT, isotropic, nodal_basis
 from enumsol.fem.meshes import blocks
-from enumsol.model.cells import HEXAHEDRON, KINDS, boundary_facets, facet_rows
+from enumsol.model.cells import KINDS, boundary_facets, by_kind, facet_rows
 from enumsol.model.mesh import BodyMesh
 from enumsol.model.problem3d import ContactProblem3D, SlipMean
 from enumsol.support.arguments import one_of, positive_integer
@@ -51,48 +51,39 @@ def solid_mesh(
     """
     nodes = meshes.positions(points, 3)
     bodies = meshes.elements(cells, "cells", kinds, len(nodes))
-    kind = KINDS[3, bodies.shape[1]]
-    corners = nodes[bodies[:, : kind.corners]]
-    size = np.max(np.ptp(corners, axis=1), axis=1) ** 3
-    volumes = _tetrahedron_volumes(corners)[:, None] if kind.corners == 4 else _corner_volumes(corners)
-    ordered = np.sort(bodies, axis=1)
-    _refuse(
-        np.any(ordered[:, 1:] == ordered[:, :-1], axis=1) & (kind.corners == 8),
-        "names a node twice, as one that is collapsed to a wedge or a pyramid does; expected distinct nodes: mesh all "
-        "of the body by tetrahedra, or by hexahedra",
-        labels,
-    )
-    turned = np.all(volumes < 0, axis=1)
-    bodies[turned] = bodies[turned][:, kind.turned]
-    volumes[turned] *= -1
-    _refuse(np.max(np.abs(volumes), axis=1) <= FLAT * size, "has no volume; expected proper cells", labels)
-    _refuse(
-        np.min(volumes, axis=1) <= FLAT * size,
-        "is turned inside out at a corner; expected hexahedra with corners in the order of VTK",
-        labels,
-    )
+    for rows, own in by_kind(3, bodies):
+        kind, first = KINDS[3, own.shape[1]], KINDS[3, KINDS[3, own.shape[1]].corners]
+        corners = nodes[own[:, : kind.corners]]
+        size = np.max(np.ptp(corners, axis=1), axis=1) ** 3
+        slopes = first.slopes(first.places[: 1 if kind.corners == 4 else None])
+        # of the parallelepipeds that the three edges at each corner span
+        volumes = np.linalg.det(np.einsum("mai,akq->mqik", corners, slopes))
+        ordered = np.sort(own, axis=1)
+        _refuse(
+            np.any(ordered[:, 1:] == ordered[:, :-1], axis=1),
+            "names a node twice, as one that is collapsed to a pyramid does; expected distinct nodes, or one that is "
+            "collapsed to a wedge or a tetrahedron",
+            rows,
+            labels,
+        )
+        turned = np.all(volumes < 0, axis=1)
+        own[turned] = own[turned][:, kind.turned]
+        bodies[rows, : own.shape[1]], bodies[rows, own.shape[1] :] = own, own[:, -1:]
+        volumes[turned] *= -1
+        _refuse(np.max(np.abs(volumes), axis=1) <= FLAT * size, "has no volume; expected proper cells", rows, labels)
+        _refuse(
+            np.min(volumes, axis=1) <= FLAT * size,
+            "is turned inside out at a corner; expected corners in the order of VTK",
+            rows,
+            labels,
+        )
     meshes.check_every_node_is_used(bodies, len(nodes), "cells", "cell")
     return nodes, bodies
 
 
-def _refuse(wrong: Mask, found: str, labels: Integers | None) -> None:
+def _refuse(wrong: Mask, found: str, rows: Integers, labels: Integers | None) -> None:
     if np.any(wrong):
-        raise InvalidArgumentError(f"{meshes.cell_name(int(np.argmax(wrong)), labels)} {found}")
-
-
-def _tetrahedron_volumes(corners: Floats) -> Floats:
-    edges = corners[:, 1:] - corners[:, :1]
-    return np.asarray(np.linalg.det(edges) / 6.0)
-
-
-def _corner_volumes(corners: Floats) -> Floats:
-    """Volumes (M, 8) of the parallelepipeds that the three edges at each corner of a hexahedron span."""
-    found, slopes = [], np.where(HEXAHEDRON == 1, 1.0, -1.0)
-    for corner in HEXAHEDRON:
-        factors = np.where(HEXAHEDRON == 1, corner, 1.0 - corner)
-        gradients = np.stack([slopes[:, k] * np.prod(np.delete(factors, k, axis=1), axis=1) for k in range(3)])
-        found.append(np.linalg.det(np.einsum("ka,mai->mki", gradients, corners)))
-    return np.stack(found, axis=1)
+        raise InvalidArgumentError(f"{meshes.cell_name(int(rows[np.argmax(wrong)]), labels)} {found}")
 
 
 def outward(facets: Integers, cells: Integers) -> Integers:
@@ -103,15 +94,10 @@ def outward(facets: Integers, cells: Integers) -> Integers:
     InvalidArgumentError
         One is not a facet on the boundary of the body, or comes twice; they have another number of corners.
     """
-    boundary = boundary_facets(3, cells)
-    if facets.shape[1] != boundary.shape[1]:
-        name = KINDS[3, cells.shape[1]].name
-        raise InvalidArgumentError(
-            f"contact has facets of {facets.shape[1]} nodes; expected {boundary.shape[1]}, as {name} have"
-        )
-    rows = facet_rows(facets, boundary, facets.shape[1])
+    outer = boundary_facets(3, cells)
+    rows = facet_rows(3, facets, outer)
     meshes.check_facets(rows, facets, "contact")
-    return boundary[rows]
+    return outer[rows]
 
 
 def facet_vectors(nodes: Floats, facets: Integers) -> Floats:
@@ -406,7 +392,7 @@ def solid_stiffness(points: ArrayLike, cells: ArrayLike, lame: tuple[float, floa
     (36, 36)
     """
     lam, mu = meshes.lame_coefficients(lame, 3)
-    return nodal_basis(*solid_mesh(points, cells)).stiffness(lam, mu)
+    return nodal_basis(*solid_mesh(points, cells)).stiffness(isotropic(np.array([lam, mu]), 6))
 
 
 def solid_body_forces(points: ArrayLike, cells: ArrayLike, density: ArrayLike) -> Floats:

@@ -201,10 +201,15 @@ def _plane(meshio: ModuleType, problem: ContactProblem, u: Floats, data: dict[st
     forces = shape.contact_forces(problem, data["lambda_n"], data["lambda_t"])
     point_data = {"displacement": _in_space(moves), "contact_force": _in_space(forces)}
     point_data |= {name: _spread(values, nodes, count) for name, values in data.items()}
-    kinds = by_kind(2, shape.cells)
-    cells = [(KINDS[2, part.shape[1]].file_name, part) for _, part in kinds]
-    cell_data = {name: [values[rows] for rows, _ in kinds] for name, values in _stresses(problem, u).items()}
+    cells, rows = _in_blocks(2, shape.cells)
+    cell_data = {name: [values[own] for own in rows] for name, values in _stresses(problem, u).items()}
     return meshio.Mesh(_in_space(shape.points), cells, point_data=point_data, cell_data=cell_data)
+
+
+def _in_blocks(dimension: int, cells: Integers) -> tuple[list[tuple[str, Integers]], list[Integers]]:
+    """Cells, or facets, of each kind by meshio's name of it, and their rows."""
+    kinds = by_kind(dimension, cells)
+    return [(KINDS[dimension, nodes.shape[1]].file_name, nodes) for _, nodes in kinds], [rows for rows, _ in kinds]
 
 
 def _in_space(vectors: Floats) -> Floats:
@@ -256,14 +261,14 @@ def _vectors(problem: ContactProblem3D, data: dict[str, Floats]) -> dict[str, Fl
 
 
 def _body(meshio: ModuleType, problem: ContactProblem3D, mesh: BodyMesh, u: Floats, data: dict[str, Floats]) -> Any:
-    kind = KINDS[3, mesh.cells.shape[1]]
-    cells = [(kind.file_name, mesh.cells)]
-    if mesh.facets is not None:
-        cells.append((kind.file_facets, mesh.facets))
+    cells, rows = _in_blocks(3, mesh.cells)
+    surface, on = ([], []) if mesh.facets is None else _in_blocks(2, mesh.facets)
     point_data: dict[str, Any] = {"displacement": mesh.displacements(u)}
-    cell_data: dict[str, Any] = {"contact_surface": [np.full(len(c), k) for k, (_, c) in enumerate(cells)]}
+    numbers = [np.full(len(part), k) for k, parts in enumerate((rows, on)) for part in parts]
+    cell_data: dict[str, Any] = {"contact_surface": numbers}
     for name, values in _stresses(problem, u).items():
-        cell_data[name] = [values, *(np.full((len(c), *values.shape[1:]), np.nan) for _, c in cells[1:])]
+        others = [np.full((len(part), *values.shape[1:]), np.nan) for part in on]
+        cell_data[name] = [*(values[part] for part in rows), *others]
     if mesh.rows is None:
         nodes = _nodes(problem, mesh)
         point_data |= {name: _spread(values, nodes, len(mesh.points)) for name, values in data.items()}
@@ -271,8 +276,9 @@ def _body(meshio: ModuleType, problem: ContactProblem3D, mesh: BodyMesh, u: Floa
         moving = np.flatnonzero(mesh.rows >= 0)
         for name, values in data.items():
             on_facets = _spread(values[mesh.rows[moving]], moving, len(mesh.rows))
-            cell_data[name] = [_spread(values[:0], moving[:0], len(mesh.cells)), on_facets]
-    return meshio.Mesh(mesh.points, cells, point_data=point_data, cell_data=cell_data)
+            nowhere = [_spread(values[:0], moving[:0], len(part)) for part in rows]
+            cell_data[name] = [*nowhere, *(on_facets[part] for part in on)]
+    return meshio.Mesh(mesh.points, cells + surface, point_data=point_data, cell_data=cell_data)
 
 
 def _nodes(problem: ContactProblem3D, mesh: BodyMesh) -> Integers:

@@ -5,7 +5,9 @@ A new element begins with an entry of `KINDS`; docs/architecture.md lists the ot
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field
+from functools import cached_property
 
 import numpy as np
 
@@ -16,6 +18,10 @@ from enumsol.support.array_types import Floats, Integers
 _SMOOTH = float(np.cos(np.radians(20.0)))
 
 
+#: Cells without sides of their own.
+_NONE = np.zeros((0, 1), dtype=np.int64)
+
+
 @dataclass(frozen=True, eq=False)
 class CellKind:
     """A kind of cell. Its nodes are its corners, then those on its edges, on its facets, and inside.
@@ -23,31 +29,29 @@ class CellKind:
     Attributes
     ----------
     name : what messages call several of them
-    file_name, file_facets : str
-        What meshio calls such cells and their facets.
+    file_name : what meshio calls them
     corners : how many of the nodes are corners
+    form : "line", "triangle", "quadrilateral", "tetrahedron", "wedge" or "hexahedron"
     facets : (k, m) int array
         Nodes of each facet: corners, in 3D counterclockwise as seen from outside a cell of positive volume, then the
-        nodes between them in the same order, then that inside.
-    mesh, element : scikit-fem's classes; of "MeshQuadS2" it has the element only
+        nodes between them in the same order, then that inside; a facet of fewer nodes than another repeats its last.
+    places : (n, d) array
+        Of the nodes in the reference cell.
+    powers : (n, d) int array
+        Exponents of the monomials that the shape functions are sums of.
     degree : of the quadrature of the stiffness
-    places : (k, d) array or None
-        Places of the nodes in the reference cell where scikit-fem's order differs.
-    simplex : whether the nodes may come in any order
     turned : list of int
         In 3D, the nodes of a cell of the other orientation in the order of one of this orientation.
     """
 
     name: str
     file_name: str
-    file_facets: str
     corners: int
+    form: str
     facets: Integers
-    mesh: str
-    element: str
+    places: Floats
+    powers: Integers
     degree: int
-    places: Floats | None = None
-    simplex: bool = False
     turned: list[int] = field(default_factory=list)
 
     @property
@@ -55,12 +59,57 @@ class CellKind:
         """Nodes of a plane cell along its outline."""
         return [int(node) for facet in self.facets for node in (facet[0], *facet[2:])]
 
+    @property
+    def sides(self) -> list[Integers]:
+        """The nodes of each facet, none repeated."""
+        return [facet[:count] for facet, count in zip(self.facets, node_counts(self.facets), strict=True)]
+
+    @cached_property
+    def _coefficients(self) -> Floats:
+        """Of the monomials in the shape functions, (n, n): whole numbers for all kinds here."""
+        inverse: Floats = np.linalg.inv(np.prod(self.places[:, None] ** self.powers, axis=2))
+        return np.round(inverse)
+
+    def values(self, places: Floats) -> Floats:
+        """Shape functions (n, q) at places (q, d) of the reference."""
+        return np.asarray((np.prod(places[:, None] ** self.powers, axis=2) @ self._coefficients).T)
+
+    def slopes(self, places: Floats) -> Floats:
+        """Their derivatives (n, d, q)."""
+        found = []
+        for k in range(self.powers.shape[1]):
+            less = self.powers.copy()
+            less[:, k] = np.maximum(less[:, k] - 1, 0)
+            found.append((self.powers[:, k] * np.prod(places[:, None] ** less, axis=2) @ self._coefficients).T)
+        return np.stack(found, axis=1)
+
+    def quadrature(self, degree: int) -> tuple[Floats, Floats]:
+        """Places (q, d) and weights (q,) that integrate polynomials of this degree over the reference."""
+        if self.form in ("triangle", "tetrahedron"):
+            from skfem.quadrature import get_quadrature  # scikit-fem takes a while to import
+            from skfem.refdom import RefTet, RefTri
+
+            places, weights = get_quadrature(RefTri if self.form == "triangle" else RefTet, degree)
+            return np.asarray(places.T), np.asarray(weights)
+        along, share = np.polynomial.legendre.leggauss(max(2, degree // 2 + 1))
+        line, share = 0.5 * along[:, None] + 0.5, 0.5 * share
+        if self.form == "wedge":
+            base, of_base = KINDS[2, 3].quadrature(degree)
+            places = np.concatenate([np.repeat(base, len(line), axis=0), np.tile(line, (len(base), 1))], axis=1)
+            return places, np.outer(of_base, share).ravel()
+        places, weights = line, share
+        for _ in range(1, self.powers.shape[1]):
+            places = np.concatenate([np.repeat(places, len(line), axis=0), np.tile(line, (len(places), 1))], axis=1)
+            weights = np.outer(weights, share).ravel()
+        return places, weights
+
 
 #: Corners of the reference hexahedron (0, 1)^3, its edges by pairs of corners, and its facets.
 HEXAHEDRON = np.array(
     [[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0], [0, 0, 1], [1, 0, 1], [1, 1, 1], [0, 1, 1]], dtype=np.float64
 )
-_EDGES = np.array([[0, 1], [1, 2], [2, 3], [3, 0], [4, 5], [5, 6], [6, 7], [7, 4], [0, 4], [1, 5], [2, 6], [3, 7]])
+_SIMPLEX = np.concatenate([np.zeros((1, 3)), np.eye(3)])
+_WEDGE = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1], [1, 0, 1], [0, 1, 1]], dtype=np.float64)
 _SIDES_27 = np.array(
     [
         [3, 0, 4, 7, 11, 16, 15, 19, 20],
@@ -71,64 +120,108 @@ _SIDES_27 = np.array(
         [4, 5, 6, 7, 12, 13, 14, 15, 25],
     ]
 )
-_TRIQUADRATIC = np.concatenate(
-    [HEXAHEDRON, HEXAHEDRON[_EDGES].mean(axis=1), HEXAHEDRON[_SIDES_27[:, :4]].mean(axis=1), [[0.5, 0.5, 0.5]]]
+_SIDES_18 = np.array(
+    [
+        [0, 2, 1, 8, 7, 6, 6, 6, 6],
+        [3, 4, 5, 9, 10, 11, 11, 11, 11],
+        [0, 1, 4, 3, 6, 13, 9, 12, 15],
+        [1, 2, 5, 4, 7, 14, 10, 13, 16],
+        [2, 0, 3, 5, 8, 12, 11, 14, 17],
+    ]
 )
+#: Edges of cells by pairs of corners, in the order of the nodes between them; by the form of a cell.
+EDGES = {
+    "line": [[0, 1]],
+    "triangle": [[0, 1], [1, 2], [2, 0]],
+    "quadrilateral": [[0, 1], [1, 2], [2, 3], [3, 0]],
+    "tetrahedron": [[0, 1], [1, 2], [2, 0], [0, 3], [1, 3], [2, 3]],
+    "wedge": [[0, 1], [1, 2], [2, 0], [3, 4], [4, 5], [5, 3], [0, 3], [1, 4], [2, 5]],
+    "hexahedron": [[0, 1], [1, 2], [2, 3], [3, 0], [4, 5], [5, 6], [6, 7], [7, 4], [0, 4], [1, 5], [2, 6], [3, 7]],
+}
 _EDGES_OF_QUADRILATERAL = np.array([[0, 1, 4], [1, 2, 5], [2, 3, 6], [3, 0, 7]])
 _TURNED_TETRAHEDRON = [0, 2, 1, 3, 6, 5, 4, 7, 9, 8]
+_TURNED_WEDGE = [0, 2, 1, 3, 5, 4, 8, 7, 6, 11, 10, 9, 12, 14, 13, 17, 16, 15]
 _TURNED_HEXAHEDRON = [0, 3, 2, 1, 4, 7, 6, 5, 11, 10, 9, 8, 15, 14, 13, 12, 16, 19, 18, 17, 22, 23, 20, 21, 24, 25, 26]
 
-#: By dimension and nodes of a cell.
+
+def _second(corners: Floats, form: str, sides: Integers = _NONE, inside: bool = False) -> Floats:
+    """Places of corners, of the middles of edges and of those sides that have nine nodes, and of the middle."""
+    own = [side[:4] for side in sides if len(np.unique(side)) == 9]
+    middles = [corners[edge].mean(axis=0) for edge in [*EDGES[form], *own]]
+    return np.array([*corners, *middles, *([corners.mean(axis=0)] if inside else [])])
+
+
+def _sums(dimension: int, degree: int) -> Integers:
+    """Exponents of all monomials up to a degree."""
+    return np.array([e for e in np.ndindex(*(degree + 1,) * dimension) if sum(e) <= degree])
+
+
+def _products(dimension: int, degree: int) -> Integers:
+    """Exponents of all monomials up to a degree in each variable."""
+    return np.array(list(np.ndindex(*(degree + 1,) * dimension)))
+
+
+def _prisms(degree: int) -> Integers:
+    return np.array([(*e, k) for e in _sums(2, degree).tolist() for k in range(degree + 1)])
+
+
+_SQUARE = HEXAHEDRON[:4, :2]
+_QUADS = [[0, 3, 2, 1], [4, 5, 6, 7], [0, 1, 5, 4], [1, 2, 6, 5], [2, 3, 7, 6], [3, 0, 4, 7]]
+_TETRAHEDRON = np.array([[0, 2, 1, 6, 5, 4], [0, 1, 3, 4, 8, 7], [1, 2, 3, 5, 9, 8], [0, 3, 2, 7, 9, 6]])
+#: By dimension and nodes of a cell; those of dimension one are the edges of plane bodies.
 KINDS: dict[tuple[int, int], CellKind] = {
+    (1, 2): CellKind("lines", "line", 2, "line", _NONE, _SQUARE[:2, :1], _sums(1, 1), 1),
+    (1, 3): CellKind("quadratic lines", "line3", 2, "line", _NONE, np.array([[0.0], [1.0], [0.5]]), _sums(1, 2), 3),
     (2, 3): CellKind(
-        *("triangles", "triangle", "line", 3, np.array([[0, 1], [1, 2], [2, 0]])),
-        *("MeshTri1", "ElementTriP1", 0),
-        simplex=True,
+        *("triangles", "triangle", 3, "triangle", np.array([[0, 1], [1, 2], [2, 0]])),
+        *(_SIMPLEX[:3, :2], _sums(2, 1), 0),
     ),
     (2, 4): CellKind(
-        *("quadrilaterals", "quad", "line", 4, _EDGES_OF_QUADRILATERAL[:, :2]),
-        *("MeshQuad1", "ElementQuad1", 3),
+        *("quadrilaterals", "quad", 4, "quadrilateral", _EDGES_OF_QUADRILATERAL[:, :2]),
+        *(_SQUARE, _products(2, 1), 3),
     ),
     (2, 6): CellKind(
-        *("quadratic triangles", "triangle6", "line3", 3, np.array([[0, 1, 3], [1, 2, 4], [2, 0, 5]])),
-        *("MeshTri2", "ElementTriP2", 4),
+        *("quadratic triangles", "triangle6", 3, "triangle", np.array([[0, 1, 3], [1, 2, 4], [2, 0, 5]])),
+        *(_second(_SIMPLEX[:3, :2], "triangle"), _sums(2, 2), 4),
     ),
     (2, 8): CellKind(
-        *("quadratic quadrilaterals with 8 nodes", "quad8", "line3", 4, _EDGES_OF_QUADRILATERAL),
-        *("MeshQuadS2", "ElementQuadS2", 5),
+        *("quadratic quadrilaterals with 8 nodes", "quad8", 4, "quadrilateral", _EDGES_OF_QUADRILATERAL),
+        *(_second(_SQUARE, "quadrilateral"), _products(2, 2)[:-1], 5),
     ),
     (2, 9): CellKind(
-        *("quadratic quadrilaterals", "quad9", "line3", 4, _EDGES_OF_QUADRILATERAL),
-        *("MeshQuad2", "ElementQuad2", 5),
+        *("quadratic quadrilaterals", "quad9", 4, "quadrilateral", _EDGES_OF_QUADRILATERAL),
+        *(_second(_SQUARE, "quadrilateral", inside=True), _products(2, 2), 5),
     ),
     (3, 4): CellKind(
-        *("tetrahedra", "tetra", "triangle", 4, np.array([[0, 2, 1], [0, 1, 3], [1, 2, 3], [0, 3, 2]])),
-        *("MeshTet1", "ElementTetP1", 0),
-        simplex=True,
+        *("tetrahedra", "tetra", 4, "tetrahedron", _TETRAHEDRON[:, :3], _SIMPLEX, _sums(3, 1), 0),
         turned=_TURNED_TETRAHEDRON[:4],
     ),
     (3, 10): CellKind(
-        *("quadratic tetrahedra", "tetra10", "triangle6", 4),
-        np.array([[0, 2, 1, 6, 5, 4], [0, 1, 3, 4, 8, 7], [1, 2, 3, 5, 9, 8], [0, 3, 2, 7, 9, 6]]),
-        *("MeshTet2", "ElementTetP2", 4),
+        *("quadratic tetrahedra", "tetra10", 4, "tetrahedron", _TETRAHEDRON),
+        *(_second(_SIMPLEX, "tetrahedron"), _sums(3, 2), 4),
         turned=_TURNED_TETRAHEDRON,
     ),
+    (3, 6): CellKind(
+        *("wedges", "wedge", 6, "wedge"),
+        np.array([[0, 2, 1, 1], [3, 4, 5, 5], [0, 1, 4, 3], [1, 2, 5, 4], [2, 0, 3, 5]]),
+        *(_WEDGE, _prisms(1), 3),
+        turned=_TURNED_WEDGE[:6],
+    ),
+    (3, 18): CellKind(
+        *("quadratic wedges", "wedge18", 6, "wedge", _SIDES_18),
+        *(_second(_WEDGE, "wedge", _SIDES_18), _prisms(2), 5),
+        turned=_TURNED_WEDGE,
+    ),
     (3, 8): CellKind(
-        *("hexahedra", "hexahedron", "quad", 8),
-        np.array([[0, 3, 2, 1], [4, 5, 6, 7], [0, 1, 5, 4], [1, 2, 6, 5], [2, 3, 7, 6], [3, 0, 4, 7]]),
-        *("MeshHex1", "ElementHex1", 3, HEXAHEDRON),
+        *("hexahedra", "hexahedron", 8, "hexahedron", np.array(_QUADS), HEXAHEDRON, _products(3, 1), 3),
         turned=_TURNED_HEXAHEDRON[:8],
     ),
     (3, 27): CellKind(
-        *("quadratic hexahedra", "hexahedron27", "quad9", 8, _SIDES_27),
-        *("MeshHex2", "ElementHex2", 5, _TRIQUADRATIC),
+        *("quadratic hexahedra", "hexahedron27", 8, "hexahedron", _SIDES_27),
+        *(_second(HEXAHEDRON, "hexahedron", _SIDES_27, inside=True), _products(3, 2), 5),
         turned=_TURNED_HEXAHEDRON,
     ),
 }
-#: Nodes of a triangle among those of the quadrilateral that it is, by the number of nodes of a quadrilateral.
-TRIANGLES = {4: [0, 1, 2], 8: [0, 1, 2, 4, 5, 7], 9: [0, 1, 2, 4, 5, 7]}
-#: Nodes of the quadrilateral that a triangle is among quadrilaterals.
-_QUADRILATERALS = {4: [0, 1, 2, 2], 8: [0, 1, 2, 2, 3, 4, 2, 5], 9: [0, 1, 2, 2, 3, 4, 2, 5, 2]}
 
 
 def numbers_of_nodes(dimension: int) -> tuple[int, ...]:
@@ -136,57 +229,96 @@ def numbers_of_nodes(dimension: int) -> tuple[int, ...]:
     return tuple(sorted(nodes for d, nodes in KINDS if d == dimension))
 
 
-def as_quadrilaterals(triangles: Integers, nodes: int) -> Integers:
-    """Triangles among quadrilaterals of 4, 8 or 9 nodes: the last corner is named twice.
+def padded(parts: Sequence[Integers], width: int = 0) -> Integers:
+    """Cells of all parts, or facets, (k, m): those of fewer nodes than m repeat their last."""
+    width = max([width, *(part.shape[1] for part in parts)])
+    return np.concatenate([part[:, np.minimum(np.arange(width), part.shape[1] - 1)] for part in parts])
 
-    So is every node that a quadrilateral has between the two or inside.
-    """
-    return triangles[:, _QUADRILATERALS[nodes]]
+
+def node_counts(cells: Integers) -> Integers:
+    """Numbers of nodes of cells or facets, (k,), the last node counted once."""
+    last = cells[:, ::-1] == cells[:, -1:]
+    repeated = np.where(np.all(last, axis=1), cells.shape[1], np.argmin(last, axis=1))
+    return np.asarray(cells.shape[1] - repeated + 1)
 
 
 def by_kind(dimension: int, cells: Integers) -> list[tuple[Integers, Integers]]:
     """The rows of cells that are of one kind, and their nodes, for each kind that there is.
 
-    Triangles among quadrilaterals are a kind of their own.
+    The kind of a cell is its number of nodes; where it has fewer than others it repeats its last.
 
     Raises
     ------
     InvalidArgumentError
-        The cells have a number of nodes that no kind has.
+        There is a number of nodes that no kind has.
     """
-    count = cells.shape[1]
-    if (dimension, count) not in KINDS:
-        known = ", ".join(map(str, numbers_of_nodes(dimension)))
-        raise InvalidArgumentError(f"cells have {count} nodes each; expected one of {known} in {dimension}D")
-    if dimension == 3 or count not in TRIANGLES:
-        return [(np.arange(len(cells)), cells)]
-    triangular = cells[:, 2] == cells[:, 3]
-    rows, others = np.flatnonzero(triangular), np.flatnonzero(~triangular)
-    parts = [(rows, cells[rows][:, TRIANGLES[count]]), (others, cells[others])]
-    return [part for part in parts if len(part[0])]
+    counts = node_counts(cells)
+    found = []
+    for count in np.unique(counts).tolist():
+        rows = np.flatnonzero(counts == count)
+        if (dimension, count) not in KINDS:
+            known = ", ".join(map(str, numbers_of_nodes(dimension)))
+            raise InvalidArgumentError(
+                f"cells row {rows[0]} has {count} nodes; expected one of {known} in {dimension}D, the last repeated "
+                "where other cells have more"
+            )
+        found.append((rows, cells[rows, :count]))
+    return found
+
+
+def boundary(dimension: int, cells: Integers) -> tuple[Integers, Integers]:
+    """Facets (k, m) that belong to one cell only, and the rows of these cells, (k,).
+
+    In 3D they are counterclockwise as seen from outside a cell of positive volume.
+    """
+    parts, owners = [], []
+    for rows, nodes in by_kind(dimension, cells):
+        local = KINDS[dimension, nodes.shape[1]].facets
+        parts.append(nodes[:, local].reshape(-1, local.shape[1]))
+        owners.append(np.repeat(rows, len(local)))
+    facets, owner = padded(parts), np.concatenate(owners)
+    repeated = np.arange(facets.shape[1]) >= node_counts(facets)[:, None]
+    keys = np.sort(np.where(repeated, -1, facets), axis=1)
+    _, first, count = np.unique(keys, axis=0, return_index=True, return_counts=True)
+    outer = np.sort(first[count == 1])
+    return np.asarray(facets[outer]), owner[outer]
 
 
 def boundary_facets(dimension: int, cells: Integers) -> Integers:
-    """Facets (k, m) that belong to one cell only; in 3D counterclockwise as seen from outside the body."""
-    parts = []
-    for _, nodes in by_kind(dimension, cells):
-        local = KINDS[dimension, nodes.shape[1]].facets
-        parts.append(nodes[:, local].reshape(-1, local.shape[1]))
-    facets = np.concatenate(parts)
-    _, first, count = np.unique(np.sort(facets, axis=1), axis=0, return_index=True, return_counts=True)
-    return np.asarray(facets[np.sort(first[count == 1])])
+    """Facets (k, m) of `boundary`."""
+    return boundary(dimension, cells)[0]
 
 
-def facet_rows(facets: Integers, among: Integers, corners: int) -> list[int]:
-    """The row of each of the facets ``among`` others, by their first ``corners`` nodes in any order; -1 for none."""
-    known = {tuple(key): row for row, key in enumerate(np.sort(among[:, :corners], axis=1).tolist())}
-    return [known.get(tuple(key), -1) for key in np.sort(facets[:, :corners], axis=1).tolist()]
+def corner_keys(dimension: int, facets: Integers) -> Integers:
+    """Corners of the facets of bodies of this dimension in ascending order, after -1 where they have fewer."""
+    keys = np.full((len(facets), 2 if dimension == 2 else 4), -1)
+    for rows, nodes in by_kind(dimension - 1, facets) if len(facets) else []:
+        corners = KINDS[dimension - 1, nodes.shape[1]].corners
+        keys[rows, keys.shape[1] - corners :] = np.sort(nodes[:, :corners], axis=1)
+    return keys
+
+
+def facet_rows(dimension: int, facets: Integers, among: Integers) -> list[int]:
+    """The row of each of the facets ``among`` others, by their corners in any order; -1 for none."""
+    known = {tuple(key): row for row, key in enumerate(corner_keys(dimension, among).tolist())}
+    return [known.get(tuple(key), -1) for key in corner_keys(dimension, facets).tolist()]
 
 
 def facet_outlines(facets: Integers) -> Integers:
-    """Nodes (k, m) along the edges of facets of solids, from corner to corner by what lies between them."""
-    outline = KINDS[2, facets.shape[1]].outline
-    return facets[:, outline]
+    """Nodes (k, m) along the edges of facets of solids, or of plane cells, by what lies between corners.
+
+    Outlines of fewer nodes than others repeat their last.
+    """
+    outlines = []
+    for rows, nodes in by_kind(2, facets):
+        outlines.append((rows, nodes[:, KINDS[2, nodes.shape[1]].outline]))
+    found = padded([nodes for _, nodes in outlines])
+    return found[np.argsort(np.concatenate([rows for rows, _ in outlines]), kind="stable")]
+
+
+def lines_along(facets: Integers) -> Integers:
+    """Nodes (k, 2) or (k, 3) of the edges of plane bodies from end to end."""
+    return facets if facets.shape[1] == 2 else facets[:, [0, 2, 1]]
 
 
 def outline_edges(points: Floats, faces: Integers) -> Integers:
@@ -197,6 +329,8 @@ def outline_edges(points: Floats, faces: Integers) -> Integers:
     normals = np.sum(np.cross(points[faces], points[after]), axis=1)
     normals /= np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), np.finfo(np.float64).tiny)
     of_face = np.repeat(np.arange(len(faces)), faces.shape[1])
+    whole = edges[:, 0] != edges[:, 1]
+    edges, of_face = edges[whole], of_face[whole]
     order = np.lexsort((edges[:, 1], edges[:, 0]))
     edges, of_face = edges[order], of_face[order]
     pair = np.flatnonzero(np.all(edges[1:] == edges[:-1], axis=1))
@@ -205,8 +339,10 @@ def outline_edges(points: Floats, faces: Integers) -> Integers:
 
 
 def contact_nodes(dimension: int, facets: Integers) -> Integers:
-    """Nodes (k, m) of facets that can be in contact: all, but of triangles of second order those between corners.
+    """Nodes of facets that can be in contact, in order: all, but of triangles of second order those between corners.
 
     A uniform pressure on a triangle with six nodes has no part at its corners.
     """
-    return facets[:, 3:] if (dimension, facets.shape[1]) == (3, 6) else facets
+    kinds = [nodes for _, nodes in by_kind(dimension - 1, facets)]
+    own = [nodes[:, 3:] if (dimension, nodes.shape[1]) == (3, 6) else nodes for nodes in kinds]
+    return np.unique(np.concatenate([nodes.ravel() for nodes in own]))

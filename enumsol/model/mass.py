@@ -1,4 +1,4 @@
-"""The mass of a body: consistent mass of a mesh by scikit-fem's elements, and the check of a matrix that is given."""
+"""The mass of a body: consistent mass of a mesh by shape functions, and the check of a matrix that is given."""
 
 from __future__ import annotations
 
@@ -89,23 +89,14 @@ def consistent_mass(points: Floats, cells: Integers, density: Floats) -> sp.csc_
     density : (M,) array
         Mass per volume, or in 2D per area, of every cell.
     """
-    import skfem  # as in fem: it takes a while to import
-    from skfem.quadrature import get_quadrature
-
     dimension, count = points.shape[1], len(points)
     total = sp.csc_array((count, count))
-    for rows, given in by_kind(dimension, cells):
-        kind, nodes = KINDS[dimension, given.shape[1]], given
-        element = getattr(skfem, kind.element)()
-        if kind.places is not None:
-            order = [int(np.argmin(np.linalg.norm(kind.places - place, axis=1))) for place in element.doflocs]
-            nodes = given[:, order]
-        X, W = get_quadrature(element, 2 * element.maxdeg + dimension)
-        values, slopes = zip(*(element.lbasis(X, i) for i in range(nodes.shape[1])), strict=True)
-        N = np.array([np.broadcast_to(value, X.shape[1:]) for value in values])
-        slope = np.stack([np.broadcast_to(of, X.shape) for of in slopes])
-        J = np.abs(np.linalg.det(np.einsum("mai,akq->mqik", points[nodes], slope)))
-        own = np.einsum("aq,bq,mq->mab", N, N, J * W * density[rows, None])
+    for rows, nodes in by_kind(dimension, cells):
+        kind = KINDS[dimension, nodes.shape[1]]
+        X, W = kind.quadrature(2 * int(np.max(np.sum(kind.powers, axis=1))) + dimension)
+        N = kind.values(X)
+        J = np.abs(np.linalg.det(np.einsum("mai,akq->mqik", points[nodes], kind.slopes(X))))
+        own = np.einsum("aq,bq,mq->mab", N, N, J * W * density[rows, None], optimize=True)
         places = np.repeat(nodes, nodes.shape[1], axis=1).ravel(), np.tile(nodes, nodes.shape[1]).ravel()
         total = total + sp.csc_array(sp.coo_array((own.ravel(), places), shape=total.shape))
     return total

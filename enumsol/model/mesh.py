@@ -9,7 +9,7 @@ import scipy.sparse as sp
 from scipy.sparse.csgraph import connected_components
 
 from enumsol.errors import InvalidArgumentError, InvalidProblemError
-from enumsol.model.cells import KINDS, numbers_of_nodes
+from enumsol.model.cells import numbers_of_nodes
 from enumsol.support.array_arguments import real_array, real_matrix, vector_of
 from enumsol.support.array_types import ArrayLike, Floats, Integers
 from enumsol.support.immutable import Immutable, SealedMatrix, sealed
@@ -23,8 +23,8 @@ class BodyMesh(Immutable):
     points : (N, d) array_like
         Positions of the nodes, d = 2 or 3 [length].
     cells : (M, k) array_like of int
-        Triangles (k = 3 or 6), quadrilaterals (4, 8 or 9), tetrahedra (4 or 10) or hexahedra (8 or 27), in the order of
-        VTK; a triangle among quadrilaterals names its last corner twice.
+        Triangles (3 or 6 nodes), quadrilaterals (4, 8 or 9), tetrahedra (4 or 10), wedges (6 or 18) and hexahedra (8 or
+        27), in the order of VTK; cells of fewer nodes than others repeat their last.
     motion : (d N, n) array_like or sparse
         Row ``d node + component`` gives that component of the node's displacement from u, in global axes; its transpose
         takes nodal forces to the problem's right-hand side. Each entry of u is the component of a node, or what several
@@ -76,7 +76,7 @@ class BodyMesh(Immutable):
         self.offset = None if offset is None else sealed(real_array(offset, "mesh_offset"))
         if self.offset is not None and self.offset.shape != self.points.shape:
             raise InvalidProblemError(f"mesh_offset has shape {self.offset.shape}; expected (N, {d}) = ({count}, {d})")
-        of_facets = (KINDS[d, self.cells.shape[1]].facets.shape[1],)
+        of_facets = numbers_of_nodes(d - 1)
         self.facets = None if facets is None else _elements(facets, "mesh_facets", of_facets, count)
         self.rows = None if rows is None else sealed(_numbers(rows, "mesh_rows", None, least=-1))
         if self.rows is not None and (self.facets is None or self.rows.shape != self.facets.shape[:1]):

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import scipy.sparse as sp
 
-from enumsol.model.cells import KINDS, boundary_facets, by_kind, facet_outlines, outline_edges
+from enumsol.model.cells import boundary, boundary_facets, facet_outlines, outline_edges
 from enumsol.model.shapes import SIGNS, BodyShape, acting_nodes, body_shape, first_view, row_frames, row_tangents, signs
 
 if TYPE_CHECKING:
@@ -78,12 +78,7 @@ def surface_stresses(problem: AnyProblem, shape: BodyShape, columns: int) -> Cal
     """
     if shape.points.shape[1] != 3 or problem.mesh is None or problem.mesh.lame is None:
         return None
-    owner = {}
-    for rows, nodes in by_kind(3, shape.cells):
-        local = nodes[:, KINDS[3, nodes.shape[1]].facets]
-        for facet, row in zip(local.reshape(-1, local.shape[2]), np.repeat(rows, local.shape[1]), strict=True):
-            owner[frozenset(facet.tolist())] = row
-    cells = [owner[frozenset(facet.tolist())] for facet in boundary_facets(3, shape.cells)]
+    _, cells = boundary(3, shape.cells)
     if 6 * len(cells) * columns > _MOST_NUMBERS:
         return None
     from enumsol.fem import cell_stresses  # scikit-fem takes a while
@@ -113,7 +108,7 @@ def drawn_body(
         faces = facet_outlines(boundary_facets(3, cells))
         nodes = np.union1d(faces, touched)
     else:
-        cells = cells[:, KINDS[2, cells.shape[1]].outline]
+        cells = facet_outlines(cells)
         edges, nodes = boundary_edges(cells), np.arange(len(new))
         if columns > most_fields(len(new), d):
             nodes = np.union1d(edges, touched)
@@ -140,9 +135,10 @@ def drawn_body(
 def _surface(shape: BodyShape, faces: Integers, new: Integers) -> dict[str, Any]:
     """Triangles and edges of the surface of a solid."""
     outline = outline_edges(shape.points, faces)
-    fan = [faces[:, [0, k, k + 1]] for k in range(1, faces.shape[1] - 1)]
+    fan = np.concatenate([faces[:, [0, k, k + 1]] for k in range(1, faces.shape[1] - 1)])
+    fan = fan[fan[:, 1] != fan[:, 2]]  # outlines of fewer nodes than others repeat their last
     return {
-        "triangles": new[np.concatenate(fan)].T.tolist(),
+        "triangles": new[fan].T.tolist(),
         # of many facets only the edges at which the surface bends
         "edges": new[_edges(faces) if len(faces) <= 2_000 else outline].tolist(),
         "outline": new[outline].tolist(),
@@ -206,7 +202,7 @@ def surroundings(
     for kind in np.unique(across[(fixed > 0) & drawn].round(6), axis=0):
         alike = np.flatnonzero((fixed > 0) & drawn & np.all(across.round(6) == kind, axis=1))
         held += [[int(new[k]), *short_list(across[k])] for k, _ in signs(shape.points, alike, edges)]
-    sprung: Any = [] if scene is None else acting_nodes(scene.springs.diagonal().reshape(count, d))
+    sprung: Any = [] if scene is None else acting_nodes(scene.springs.diagonal()[: count * d].reshape(count, d))
     sprung = np.array([node for node in sprung if drawn[node]], dtype=int)
     springs = [int(new[node]) for node, _ in signs(shape.points, sprung, edges)]
     return {"load": short_list(load), "summed": summed, "held": held, "springs": springs}
@@ -256,7 +252,7 @@ def vectors(forces: Floats, nodes: Integers) -> list[list[float]]:
 def boundary_edges(outlines: Integers) -> Integers:
     """Edges that belong to one cell only, (k, 2)."""
     edges = np.concatenate([outlines[:, [k, (k + 1) % outlines.shape[1]]] for k in range(outlines.shape[1])])
-    edges = edges[edges[:, 0] != edges[:, 1]]  # triangles among quadrilaterals name a corner twice
+    edges = edges[edges[:, 0] != edges[:, 1]]  # outlines of fewer nodes than others repeat their last
     _, first, count = np.unique(np.sort(edges, axis=1), axis=0, return_index=True, return_counts=True)
     return np.asarray(edges[first[count == 1]])
 

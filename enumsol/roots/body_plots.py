@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from enumsol.errors import InvalidArgumentError
-from enumsol.model.cells import KINDS, boundary_facets, facet_outlines, outline_edges
+from enumsol.model.cells import boundary_facets, facet_outlines, outline_edges
 from enumsol.model.shapes import (
     SLIP_ARROW,
     BodyShape,
@@ -181,7 +181,7 @@ def _same_view(axes: Sequence[Any]) -> None:
 def _plane(ax: Axes, shape: BodyShape, points: Floats) -> None:
     from matplotlib.collections import PolyCollection
 
-    cells = shape.cells[:, KINDS[2, shape.cells.shape[1]].outline]
+    cells = facet_outlines(shape.cells)
     ax.add_collection(PolyCollection(list(shape.points[cells]), facecolors="none", edgecolors=_BEFORE, linewidths=0.5))
     ax.add_collection(PolyCollection(list(points[cells]), facecolors=_BODY, edgecolors=_EDGE, linewidths=0.6))
     for positions in (shape.points, points):

@@ -244,7 +244,7 @@ INSIDE = BOX.cells[0][[1, 2, 6, 5]]
     ("options", "message"),
     [
         ({"contact": []}, "contact has no facets"),
-        ({"contact": BOTTOM[:, :3]}, "contact has facets of 3 nodes; expected 4, as hexahedra have"),
+        ({"contact": BOTTOM[:, :3]}, "contact row 0, nodes .*, is not a facet on the boundary"),
         ({"contact": [[0, 1, 4, 99]]}, "contact has node numbers from 0 to 99"),
         ({"contact": [INSIDE]}, r"contact row 0, nodes .* is not a facet on the boundary of the body"),
         ({"contact": [*BOTTOM, BOTTOM[0]]}, "contact names a facet twice"),

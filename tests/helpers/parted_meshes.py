@@ -41,8 +41,6 @@ def _second_order(points, cells, edges, kind):
     points, between = list(points), {}
 
     def middle(one, two):
-        if one == two:  # a triangle among quadrilaterals
-            return one
         key = (min(one, two), max(one, two))
         if key not in between:
             between[key] = len(points)
@@ -51,10 +49,10 @@ def _second_order(points, cells, edges, kind):
 
     rows = []
     for cell in cells.tolist():
-        row = cell + [middle(cell[a], cell[b]) for a, b in EDGES[len(cell)]]
-        if kind == 9 and cell[2] == cell[3]:
-            row.append(cell[3])
-        elif kind == 9:
+        corners = list(dict.fromkeys(cell))  # a triangle among quadrilaterals repeats its last node
+        row = corners + [middle(corners[a], corners[b]) for a, b in EDGES[len(corners)]]
+        row += row[-1:] * (kind - len(row) if len(corners) < len(cell) else 0)
+        if kind == 9 and len(row) == 8:
             row.append(len(points))
             points.append(np.mean([points[node] for node in cell], axis=0))
         rows.append(row)
