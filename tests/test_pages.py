@@ -114,7 +114,7 @@ def test_from_a_deck(from_a_deck):
     shipped = ROOT / "tests" / "decks" / "block_on_base.inp"
     assert (from_a_deck["folder"] / "model.inp").read_text(encoding="utf-8") == shipped.read_text(encoding="utf-8")
     printed = [text for kind, text in blocks(DOCS / "from_a_deck.md") if kind == "text"]
-    assert [text for _, text in from_a_deck["outputs"]][0] == printed[1]
+    assert from_a_deck["outputs"][0][1] == printed[1]
     told = str(from_a_deck["model"]).splitlines()
     assert all(line in told for line in printed[0].splitlines() if line != "...")
     assert (from_a_deck["history"].complete, len(from_a_deck["roots"])) == (True, 1)

@@ -69,7 +69,15 @@ SHARED = {
     "trusted.at_alpha": {"VerifiedSelection", "settled_selection", "solve_selection"},
     "trusted.precise_at_alpha": {"PreciseAtAlpha"},
     "trusted.motions_of_body": {
-        *("BodyMotions", "Setting", "direction", "friction_directions", "friction_over", "reciprocal"),
+        *(
+            "BodyMotions",
+            "Setting",
+            "direction",
+            "friction_changes",
+            "friction_directions",
+            "friction_over",
+            "reciprocal",
+        ),
     },
     "trusted.running_away": None,
     "trusted.quadratic_forms": {"EnclosedForm", "Equations", "QuadraticForm"},

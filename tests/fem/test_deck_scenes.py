@@ -22,6 +22,12 @@ def read(tmp_path):
     return read
 
 
+#: The upper block with its underside a little above the lower one.
+LIFTED = (
+    MESH.replace("11, 0., 1.", "11, 0., 1.004")
+    .replace("12, 1., 1.", "12, 1., 1.004")
+    .replace("13, 2., 1.", "13, 2., 1.004")
+)
 #: Decks by what is special about them, with the options that describe the same.
 RIGHT = {
     "plain": (deck(), {}),
@@ -62,6 +68,8 @@ RIGHT = {
     "a clearance": (deck(contact=CONTACT + "*CLEARANCE, SLAVE=UNDER, MASTER=ON, VALUE=0.004\n"), {"pairs": [("UNDER", "ON", 0.004)]}),
     "a press fit": (deck(contact=CONTACT + "*CLEARANCE, MASTER=ON, SLAVE=UNDER, VALUE=-0.004\n"), {"pairs": [("UNDER", "ON", -0.004)]}),
     "contact of a surface of nodes": (deck(mesh=MESH + "*SURFACE, NAME=POINTS, TYPE=NODE\n11\n12\n13\n", contact=CONTACT.replace("UNDER", "POINTS")), {}),
+    "gaps that are closed": (deck(mesh=LIFTED, contact=CONTACT.replace("DRY\nUNDER", "DRY, ADJUST=0.01\nUNDER")), {}),
+    "a press fit that is taken away": (deck(mesh=LIFTED.replace("1.004", "0.996"), contact=CONTACT.replace("DRY\nUNDER", "DRY, ADJUST=0.\nUNDER")), {}),
     "friction that changes in the step": (deck(steps=step("*CHANGE FRICTION, INTERACTION=DRY\n*FRICTION\n0.1\n" + DOWN + PUSH)), {"friction": 0.1}),
     "friction that changes to none": (deck(steps=step("*CHANGE FRICTION, INTERACTION=DRY\n*FRICTION\n0.\n" + DOWN + PUSH)), {"friction": 0.0}),
 }  # fmt: skip
@@ -122,6 +130,7 @@ WRONG = {
     "friction in a step": (deck(steps=step("*FRICTION\n0.1\n")), r"line \d+: \*FRICTION stands in a step without \*CHANGE FRICTION"),
     "another interaction changes": (deck(steps=step("*CHANGE FRICTION, INTERACTION=WET\n*FRICTION\n0.1\n")), r"line \d+: \*CHANGE FRICTION names the interaction WET"),
     "surfaces that cannot part": (deck(contact=CONTACT.replace("*FRICTION", "*SURFACE BEHAVIOR, NO SEPARATION\n*FRICTION")), r"line \d+: \*SURFACE BEHAVIOR has NO SEPARATION"),
+    "an adjustment of a set": (deck(contact=CONTACT.replace("DRY\nUNDER", "DRY, ADJUST=BOTTOM\nUNDER")), r"line \d+: \*CONTACT PAIR has ADJUST=BOTTOM; expected the distance up to which nodes are moved"),
     "a clearance of no pair": (deck(contact=CONTACT + "*CLEARANCE, SLAVE=ON, MASTER=UNDER, VALUE=0.1\n"), r"line \d+: \*CLEARANCE names the pair ON:UNDER; .* UNDER:ON"),
     "a clearance of no size": (deck(contact=CONTACT + "*CLEARANCE, SLAVE=UNDER, MASTER=ON\n"), r"line \d+: \*CLEARANCE has no VALUE"),
     "contact in a step": (deck(steps=step("*CONTACT PAIR, INTERACTION=DRY\nUNDER, ON\n")), r"line \d+: \*CONTACT PAIR stands in a step"),
@@ -139,6 +148,13 @@ def test_what_cannot_be_used_is_refused_in_one_sentence_with_its_line(read, name
         read(text).problem()
     assert "\n" not in str(found.value)
     assert "model.inp" in str(found.value)
+
+
+def test_gaps_beyond_the_distance_stay(read):
+    far = read(deck(mesh=LIFTED, contact=CONTACT.replace("DRY\nUNDER", "DRY, ADJUST=0.002\nUNDER"))).problem()
+    assert far.node_ids == (11, 12, 13)
+    np.testing.assert_allclose(far.gap, 0.004, rtol=1e-9)
+    np.testing.assert_allclose(far.coordinates[:, 1], 1.004)
 
 
 def test_what_is_ignored_is_said(read):
