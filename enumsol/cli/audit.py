@@ -10,7 +10,6 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal, NoReturn
 import typer
 
 from enumsol.cli.common import ExitStatus, finish, load_problem, parse_alpha, parse_interval, scene_of, so_far
-from enumsol.cli.decks import deck_named, is_deck
 from enumsol.cli.graph import build, read_graph
 from enumsol.cli.options import Argument, Arithmetic, Number, OutputFile, Problem, Quiet
 from enumsol.cli.output import deliver
@@ -122,7 +121,7 @@ def _audit_result(
     name: str, file: str, alpha: str | None, tolerance: float | None, arithmetic: Arithmetic, json_file: str | None
 ) -> NoReturn:
     """Compare a result of CalculiX with all roots, and end the command."""
-    from enumsol.auditing.results import TOLERANCE, compare_result  # numpy and scipy: not for --help
+    from enumsol.auditing.results import TOLERANCE, compare_result
     from enumsol.io.calculix import read_results
     from enumsol.roots.enumerate import enumerate_roots
 
@@ -131,7 +130,8 @@ def _audit_result(
     if body.mesh is None:
         raise InvalidArgumentError(f"{name} has no mesh; expected a problem made of one, to compare with {file}")
     plane = None if about is None else about.options.plane
-    numbers = deck_named(name).node_names if is_deck(name) else None
+
+    numbers = None if about is None else about.mesh.node_labels
     moved = result.on(body.mesh, numbers, axisymmetric=str(plane) == "axisymmetric")
     with search_display() as display:
         found, ended = so_far(

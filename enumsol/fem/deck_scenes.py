@@ -122,11 +122,6 @@ class DeckModel:
         """Mesh with the parts that the deck names, and those on which something acts."""
         return self._parts.mesh()
 
-    @property
-    def node_names(self) -> list[str | int]:
-        """Numbers in the deck of all nodes of the mesh, behind the names of their instances if there are any."""
-        return self._parts.node_names(range(len(self.mesh.points)))
-
     def scene(self, step: int | None = None) -> Scene:
         """Scene at the end of a step (from 1), reached from no load at once; of a deck with one step, that one.
 

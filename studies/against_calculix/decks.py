@@ -116,9 +116,10 @@ class Deck:
             "*CONTACT PAIR, INTERACTION=I, TYPE=SURFACE TO SURFACE", f"{slave},{master}",
         ]  # fmt: skip
 
-    def step(self, *lines):
-        """A static step with the output that is compared."""
-        self.lines += ["*STEP", "*STATIC", "0.25,1.", *lines, "*NODE PRINT, NSET=ALL", "U", "*END STEP"]
+    def step(self, base, *lines):
+        """A static step with the output that is compared: displacements, and the reaction at the base of a body."""
+        self.lines += ["*STEP", "*STATIC", "0.25,1.", *lines, "*NODE PRINT, NSET=ALL", "U"]
+        self.lines += [f"*NODE PRINT, NSET={base}, TOTALS=ONLY", "RF", "*END STEP"]
 
     def text(self):
         """The deck."""
@@ -144,6 +145,7 @@ def block_on_slab(kind, n, friction=0.3):
     deck.lines += ["*BOUNDARY", f"NSLAB_{up}0,1,{d}"]
     # the block's far side is moved down and along, which holds it without contact
     deck.step(
+        f"NSLAB_{up}0",
         "*BOUNDARY",
         f"NBLOCK_{up}1,1,1,4e-4",
         *([f"NBLOCK_{up}1,2,2,0"] if d == 3 else []),
@@ -161,7 +163,7 @@ def ring_on_shaft(kind, n, friction=0.2, taper=0.0):
     deck.material(1000.0, 0.3)
     deck.contact("RING_X0", "SHAFT_X1", friction, 1e6)
     deck.lines += ["*BOUNDARY", "NSHAFT_Y0,2,2"]
-    deck.step("*BOUNDARY", "NRING_Y1,2,2,5e-4")
+    deck.step("NSHAFT_Y0", "*BOUNDARY", "NRING_Y1,2,2,5e-4")
     return deck.text()
 
 
