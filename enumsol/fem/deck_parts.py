@@ -16,7 +16,6 @@ from enumsol.model.cells import KINDS, by_kind
 from enumsol.support.messages import counted
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable
 
     from enumsol.decks.cards import DeckPlace
     from enumsol.decks.model import Deck
@@ -129,15 +128,6 @@ class DeckParts:
         """Rows of the nodes of bodies, in the order in which its mesh has them."""
         own = [block.nodes.ravel() for block in self._deck.blocks if block.type.is_body]
         return np.unique(np.concatenate([np.zeros(0, dtype=np.int64), *own]))
-
-    def node_names(self, mesh_nodes: Iterable[int]) -> list[str | int]:
-        """Numbers in the deck of nodes of its mesh, behind the names of their instances if there are any.
-
-        Nodes in the middle of facets, which elements of 20 nodes do not have, are called so.
-        """
-        used = self._used
-        names = [self._deck.node_name(used[node]) if node < len(used) else f"centre-{node}" for node in mesh_nodes]
-        return [int(name) if name.isdigit() else name for name in names]
 
     def adjusted(self, scene: Scene) -> PartedMesh | None:
         """Mesh whose contact nodes are moved onto what they face where the deck says so; None if it moves none."""
