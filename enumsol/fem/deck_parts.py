@@ -16,7 +16,6 @@ from enumsol.model.cells import KINDS, by_kind
 from enumsol.support.messages import counted
 
 if TYPE_CHECKING:
-
     from enumsol.decks.cards import DeckPlace
     from enumsol.decks.model import Deck
     from enumsol.fem.meshes import PartedMesh

@@ -320,3 +320,11 @@ def test_a_deck_of_parts_and_instances():
     order = [int(np.argmin(np.linalg.norm(other.coordinates - place, axis=1))) for place in problem.coordinates]
     np.testing.assert_allclose(one[0].lambda_n, two[0].lambda_n[order], rtol=1e-9)
     np.testing.assert_allclose(problem.areas, other.areas[order])
+
+
+def test_options_that_change_nothing_are_said(read):
+    contact = CONTACT.replace("DRY\nUNDER", "DRY, TYPE=SURFACE TO SURFACE, SMALL SLIDING\nUNDER")
+    model = read(deck(contact=contact, steps=step(DOWN + PUSH, ", INC=100").replace("*STATIC", "*STATIC, DIRECT")))
+    assert_same(model.problem(), by_hand())
+    for card, option in (("*STEP", "INC"), ("*STATIC", "DIRECT"), ("*CONTACT PAIR", "TYPE")):
+        assert f"; {option} is not used" in next(row for row in str(model).splitlines() if f" {card} " in row)
