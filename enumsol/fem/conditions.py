@@ -31,7 +31,7 @@ if TYPE_CHECKING:
 
     Names = str | Sequence[str]
     Vectors = Mapping[str, ArrayLike] | None
-    Plane = Literal["strain", "stress"]
+    Plane = Literal["strain", "stress", "axisymmetric"]
     Coefficients = float | Mapping[str, float] | None
     Written = Callable[[str, str, str], str]
 
@@ -50,6 +50,8 @@ class Options:
     pairs: Sequence[Sequence[Any]]
     plane: Plane | Mapping[str, Plane] | None
     thickness: float | Mapping[str, float]
+    expansion: float | Mapping[str, float] | None
+    temperature: ArrayLike | Mapping[str, float] | None
     density: float | Mapping[str, float] | None
     friction: Coefficients
     friction_slope: Coefficients
@@ -184,8 +186,8 @@ def by_part(value: object, name: str) -> dict[str, Any]:
 # -- supports --------------------------------------------------------------------------------------------------------
 
 
-def supports_of(mesh: PartedMesh, options: Options) -> Supports:
-    """Displacements that the options clamp, symmetry and displacement give.
+def supports_of(mesh: PartedMesh, options: Options, axis: Integers | None = None) -> Supports:
+    """Displacements that the options clamp, symmetry and displacement give; nodes ``axis`` stay on the axis x = 0.
 
     Raises
     ------
@@ -215,6 +217,9 @@ def supports_of(mesh: PartedMesh, options: Options) -> Supports:
         # rollers in a plane are a plane of symmetry, however they are given
         if len(given) == 1 and (0.0, 0.0) in given.values() and _flat(mesh, nodes) == [*given]:
             found.mirrored[nodes, next(iter(given))] = True
+    if axis is not None and len(axis):
+        _fix(found, "the axis of the axisymmetric body", axis, 0)
+        found.mirrored[axis, 0] = True
     return found
 
 
@@ -275,14 +280,24 @@ class BodyPiece:
         Which nodes are its own.
     name : str
         What messages call it: the names of parts of the body, or of the boundary, that it consists of.
+    axisymmetric : bool
+        Its only rigid motion is along the axis.
     """
 
     nodes: Mask
     name: str
+    axisymmetric: bool = False
+
+    def _motions(self, points: Floats, *, plain: bool = False) -> Floats:
+        """Rigid motions (d N, r) of its nodes, rotations in units of its extent and about its middle, or plain ones."""
+        own = points[self.nodes]
+        places = points if plain else (points - own.mean(axis=0)) / np.max(np.ptp(own, axis=0))
+        motions = rigid_motions(places)[:, 1:2] if self.axisymmetric else rigid_motions(places)
+        return np.where(np.repeat(self.nodes, points.shape[1])[:, None], motions, 0.0)
 
     def free_motions(self, points: Floats, hold: sp.csc_array) -> int:
         """Number of its rigid motions that nothing holds; ``hold`` is a stiffness of supports and springs."""
-        motions = _rigid_motions(points, self.nodes)
+        motions = self._motions(points)
         values = np.linalg.eigvalsh(motions.T @ (hold @ motions))
         return int(np.sum(values <= _HELD * max(values[-1], np.finfo(np.float64).tiny)))
 
@@ -291,10 +306,10 @@ class BodyPiece:
 
         Where supports or springs leave only some of them, they are combinations of a rotation and translations.
         """
-        motions = _rigid_motions(points, self.nodes)
+        motions = self._motions(points)
         count = self.free_motions(points, hold)
         if count == motions.shape[1]:
-            return np.where(np.repeat(self.nodes, points.shape[1])[:, None], rigid_motions(points), 0.0)
+            return self._motions(points, plain=True)
         _, vectors = np.linalg.eigh(motions.T @ (hold @ motions))
         # echelon form: what is a translation becomes one exactly
         table, row = vectors[:, :count].T.copy(), 0
@@ -311,14 +326,15 @@ class BodyPiece:
         return np.asarray(motions @ table.T)
 
 
-def pieces_of(mesh: PartedMesh) -> list[BodyPiece]:
-    """All connected bodies of a mesh."""
+def pieces_of(mesh: PartedMesh, axisymmetric: bool = False) -> list[BodyPiece]:
+    """All connected bodies of a mesh, whose rigid motions are along the axis alone if they are axisymmetric."""
     points, cells = mesh.points, mesh.cells
     first = np.repeat(cells[:, :1], cells.shape[1] - 1, axis=1)
     links = (np.ones(first.size), (first.ravel(), cells[:, 1:].ravel()))
     count, piece_of = connected_components(sp.coo_array(links, shape=(len(points),) * 2), directed=False)
     masks = [piece_of == piece for piece in range(count)]
-    return [BodyPiece(mask, "the body" if count == 1 else _name_of(mesh, mask)) for mask in masks]
+    names = ["the body" if count == 1 else _name_of(mesh, mask) for mask in masks]
+    return [BodyPiece(mask, name, axisymmetric) for mask, name in zip(masks, names, strict=True)]
 
 
 def _name_of(mesh: PartedMesh, inside: Mask) -> str:
@@ -359,13 +375,6 @@ def rigid_modes_of(pieces: Sequence[BodyPiece], points: Floats, hold: sp.csc_arr
     """The rigid motions of bodies that nothing holds, (d N, r); None if there are none."""
     modes = np.hstack([piece.free_modes(points, hold) for piece in pieces])
     return modes if modes.shape[1] else None
-
-
-def _rigid_motions(points: Floats, inside: Mask) -> Floats:
-    """Displacements (d N, 3) or (d N, 6) by translations and rotations of nodes, in units of their extent."""
-    own = points[inside]
-    places = (points - own.mean(axis=0)) / np.max(np.ptp(own, axis=0))
-    return np.where(np.repeat(inside, points.shape[1])[:, None], rigid_motions(places), 0.0)
 
 
 def rigid_motions(places: Floats) -> Floats:
