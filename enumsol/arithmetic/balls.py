@@ -452,12 +452,21 @@ class Inverse:
     def solve(self, B: Ball) -> Ball:
         """All X with M X = B, columns of unknowns."""
         R, X = Ball.exact(self.approximate), Ball.exact(self._near(B.mid))
-        step = (R @ (B - self._M @ X)).size
-        # |error| <= step + defect |error|; with step <= t u in every column |error| <= t u / (1 - contraction)
+        return self._within(X.mid, (R @ (B - self._M @ X)).size)
+
+    def whole(self) -> Ball:
+        """All inverses."""
+        # R M = I - E: M^-1 - R = E R + E (M^-1 - R)
+        R, k = self.approximate, gamma(len(self.approximate) + 2)
+        return self._within(R, (self._defect @ np.abs(R)) * (1.0 + k) + TINY)
+
+    def _within(self, X: Array, step: Array) -> Ball:
+        """X with its error, |error| <= step + defect |error|, columns of unknowns."""
+        # with step <= t u in every column |error| <= t u / (1 - contraction)
         u = self._weights
         largest = np.max(step / u[:, None], axis=0) / self._share * SAFE
         rad = (step + upper_sum(self._defect * u, axis=1)[:, None] * largest) * SAFE
-        return Ball(X.mid * self._scale[:, None], rad * self._scale[:, None] + TINY)
+        return Ball(X * self._scale[:, None], rad * self._scale[:, None] + TINY)
 
 
 def solution(M: Ball, B: Ball) -> Ball | None:

@@ -11,11 +11,11 @@ What it rests on
     The energy bound (theory, (5.2)), branchings that cover, a-priori error bounds of IEEE double arithmetic with
     rounding to nearest, and rational arithmetic. In lines of code, beside numpy, scipy and python-flint:
 
-    - 7,000 in ``trusted``: the tests of leaves, of which the search calls the same ones before it writes a leaf;
+    - 6,900 in ``trusted``: the tests of leaves, of which the search calls the same ones before it writes a leaf;
     - 2,600 in ``checker``: reading, counting, joining of roots, and rational leaves in arithmetic of its own, for the
       checker alone;
     - 1,200 in ``condensation``: S, g and F as balls or rationals, proven from the data;
-    - 1,300 in ``model``: the data, their checks and their fingerprint;
+    - 1,400 in ``model``: the data, their checks and their fingerprint;
     - 1,000 in ``proof`` and 900 in ``support``: files and records, read within bounds; messages and limits;
     - 700 in ``arithmetic``: balls and rationals.
 

@@ -12,7 +12,7 @@ from enumsol.arithmetic.balls import TINY, Ball
 from enumsol.checker.walk import NO_FORM, Located, TreeChecker
 from enumsol.condensation.data import exactly_at
 from enumsol.condensation.space_condensed import EnclosedSpace
-from enumsol.proof.leaves import Alone, BoxedRoot, Excluded
+from enumsol.proof.leaves import Alone, BoxedRoot, Excluded, OnlyReference
 from enumsol.proof.reading import RefusedError, data_of, rational_from, shown_alpha, units_from
 from enumsol.proof.records import DeclaredForm, Limits, Tree
 from enumsol.trusted.space.boxed_solution import Box, BoxedSolution, apart_in_boxes, is_inside, solution_in_box
@@ -68,7 +68,7 @@ class SpaceChecker(TreeChecker[EnclosedSpace, "SpaceRoot | LooseSolution"]):
     # -- leaves ----------------------------------------------------------------------------------------------------
 
     def _limits(self, codes: Codes, kind: type[Record]) -> Limits:
-        components = len(self.system.g) if kind in (DeclaredForm, Alone) else 0
+        components = len(self.system.g) if kind in (DeclaredForm, Alone, OnlyReference) else 0
         return Limits(codes, self.tree, (), self.declared, components, self.problem.modes.r)
 
     def _without_bound(self) -> EnclosedSpace:

@@ -91,11 +91,6 @@ def _numbers(text: str, option: str) -> list[Any]:
     return [_entry(part, option, text) for part in text.split(",")]
 
 
-def _one_or_two(text: str, option: str) -> Any:
-    numbers = _numbers(text, option)
-    return numbers[0] if len(numbers) == 1 else numbers
-
-
 def _plane(text: str, option: str) -> str:
     if text not in ("strain", "stress", "axisymmetric"):
         raise InvalidArgumentError(f"{option} is {text}; expected strain, stress or axisymmetric")
@@ -113,6 +108,33 @@ def _obstacle(text: str, option: str) -> dict[str, Any]:
     return _by_part([text], option, _numbers)
 
 
+def _parts(text: str, option: str) -> list[str]:
+    del option
+    return text.split(",")
+
+
+def _number_or_numbers(text: str, option: str) -> Any:
+    numbers = _numbers(text, option)
+    return numbers[0] if len(numbers) == 1 else numbers
+
+
+def _axes(text: str, option: str) -> dict[str, Any]:
+    kind, _, numbers = text.partition(":")
+    return {kind: _numbers(numbers, option)}
+
+
+def _equation(text: str, option: str) -> dict[str, Any]:
+    left, sign, right = text.partition("=")
+    terms = []
+    for term in left.split(","):
+        place, _, coefficient = term.strip().partition(":")
+        node, dot, component = place.rpartition(".")
+        if not dot:
+            raise InvalidArgumentError(f"{option} is {text}; expected NODE.x:NUMBER,NODE.y:NUMBER=NUMBER")
+        terms.append([node, component, _entry(coefficient, option, text)])
+    return {"terms": terms} | ({"value": _entry(right, option, text)} if sign else {})
+
+
 _PULL = "NAME=fx,fy[,fz]"
 #: By their names in `fem.mesh_problem`.
 MESH_OPTIONS = {
@@ -125,9 +147,9 @@ MESH_OPTIONS = {
     "expansion": Given(_BODY, "[NAME=]NUMBER", _number),
     "temperature": Given(_LOAD, "[NAME=]NUMBER", _number),
     "density": Given(_BODY, "[NAME=]DENSITY", _number),
-    "friction": Given(_BODY, "[NAME=]F", _one_or_two),
-    "friction_slope": Given(_BODY, "[NAME=]F", _one_or_two),
-    "friction2": Given(_BODY, "[NAME=]F", _one_or_two),
+    "friction": Given(_BODY, "[NAME=]F", _number_or_numbers),
+    "friction_slope": Given(_BODY, "[NAME=]F", _number_or_numbers),
+    "friction2": Given(_BODY, "[NAME=]F", _number_or_numbers),
     "friction2_slope": Given(_BODY, "[NAME=]F", _number),
     "axis": Given(_BODY, "x,y,z", _numbers, False),
     "gap": Given(_BODY, "[NAME=]LENGTH", _number),
@@ -137,7 +159,14 @@ MESH_OPTIONS = {
     "symmetry": Given(_SUPPORT, "NAME", _as_given),
     "displacement": Given(_SUPPORT, "NAME=ux,uy[,uz]", _numbers),
     "displacement_slope": Given(_SUPPORT, "NAME=ux,uy[,uz]", _numbers),
+    "transform": Given(_SUPPORT, "NAME=KIND:NUMBERS", _axes),
+    "tie": Given(_SUPPORT, "NAME:NAME[:GAP]", _pair),
+    "reference": Given(_SUPPORT, "NAME=x,y[,z]", _numbers),
+    "rigid": Given(_SUPPORT, "NAME=PART[,PART]", _parts),
+    "coupling": Given(_SUPPORT, "NAME=PART[,PART]", _parts),
+    "equations": Given(_SUPPORT, "NODE.x:C,NODE.y:C[=VALUE]", _equation),
     "spring": Given(_SUPPORT, "NAME=kn,kt", _numbers),
+    "node_spring": Given(_SUPPORT, "NAME[:NAME]=kx,ky[,kz]", _number_or_numbers),
     "max_rigid_displacement": Given(_SUPPORT, "LENGTH|auto", _auto_or_number, False),
     "load": Given(_LOAD, _PULL, _numbers),
     "load_slope": Given(_LOAD, _PULL, _numbers),
@@ -147,6 +176,8 @@ MESH_OPTIONS = {
     "body_force_slope": Given(_LOAD, "[NAME=]fx,fy[,fz]", _numbers),
     "force": Given(_LOAD, _PULL, _numbers),
     "force_slope": Given(_LOAD, _PULL, _numbers),
+    "moment": Given(_LOAD, "NAME=M[,My,Mz]", _number_or_numbers),
+    "moment_slope": Given(_LOAD, "NAME=M[,My,Mz]", _number_or_numbers),
 }
 
 
@@ -215,7 +246,14 @@ def solve(
     symmetry : Part on a plane of symmetry, or on rollers.
     displacement : Prescribed displacements; `free` for a component that is not prescribed.
     displacement_slope : The same, times alpha.
+    transform : Axes of nodes: rectangular:ax,ay (in 3D ax,ay,az,bx,by,bz), cylindrical:x,y (in 3D two points).
+    tie : Parts that are joined, first the one whose nodes follow the facets of the other; may be repeated.
+    reference : A reference point, for rigid, coupling, force, moment, clamp, displacement and node-spring.
+    rigid : Parts that move as a rigid body with a reference point.
+    coupling : Parts over which force and moment of a reference point are distributed.
+    equations : A linear equation between displacements, such as tip.x:1,7.x:-1=0.01; may be repeated.
     spring : Springs per area, along the normal and along the tangents.
+    node_spring : Springs at each node, or between two nodes (also one stiffness, along the line between them).
     max_rigid_displacement : Let bodies that only contact holds move as a whole, by at most this length; auto: 10 times
         the mesh's size.
     load : Force per area (in 2D per length and unit thickness).
@@ -226,6 +264,8 @@ def solve(
     body_force_slope : The same, times alpha.
     force : Force on each node of a part or set of nodes, in 2D of the whole thickness.
     force_slope : The same, times alpha.
+    moment : Moment on a reference point.
+    moment_slope : The same, times alpha.
     alpha : Parameter value: a number, or a fraction such as 8/3; required if friction or load depend on it.
     output : Write the problem for the other commands: .npz, .h5, or a new directory.
     dry_run : Print what was understood: bodies, parts, loads, contact nodes, rigid modes. Nothing is solved.

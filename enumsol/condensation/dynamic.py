@@ -21,7 +21,7 @@ from enumsol.errors import InvalidProblemError
 if TYPE_CHECKING:
     from fractions import Fraction
 
-    from enumsol.support.array_types import Floats
+    from enumsol.support.array_types import Floats, Mask
 
 
 class Pencil:
@@ -107,8 +107,6 @@ class DynamicStiffness:
     ) -> None:
         self.A, self.M, self.rows, self._modes, self.springs = A, M, rows, modes, springs
         self._rest, self._known = rest, dict[float, Ball | None]()
-        #: What a search keeps of it in floats.
-        self.spectrum: Any = None
 
     def at(self, mu: float) -> Ball | None:
         """K(mu), (m, m) [force / length]; None where it is not enclosed."""
@@ -137,39 +135,46 @@ class DynamicStiffness:
 
         Degrees of freedom without mass that contact rows do not touch are left out: they follow the others.
         """
-        massive = self.M.diagonal() > 0
-        rows = self.rows[:, massive]
-        if not self.increases or not np.any(massive) or self.rows[:, ~massive].nnz:
+        if self._mobility is None or self.rows[:, ~self._massive].nnz:
             return None
-        return self._limit(self.M, rows, massive)
+        try:
+            return self._inverse(self._mobility)
+        except NotEnclosedError:
+            return None
 
     @cached_property
     def stiffest(self) -> Ball | None:
         """The limit of K(mu) where all contact rows act on degrees of freedom without mass; others stand still."""
-        massless = self.M.diagonal() == 0
-        rows = self.rows[:, massless]
+        massless = ~self._massive
+        rows = sp.csr_array(self.rows[:, massless])
         if not self.increases or np.any(np.diff(rows.indptr) == 0):
             return None
-        return self._limit(self.A, rows, massless)
+        part = sp.csc_array(sp.csr_array(self.A)[massless][:, massless])
+        try:
+            return self._inverse(Pencil(part, rows).compliance())
+        except NotEnclosedError:
+            return None
 
-    @cached_property
+    @property
     def increases(self) -> bool:
         """True if M is proven positive definite where it is not zero: K(mu) then increases with mu."""
-        massive = self.M.diagonal() > 0
-        if not np.any(massive) or sp.csr_array(self.M)[~massive].nnz:
-            return False
-        try:
-            part = sp.csc_array(sp.csr_array(self.M)[massive][:, massive])
-            Pencil(part, sp.csr_array(self.rows[:1][:, massive])).compliance()
-        except NotEnclosedError:
-            return False
-        return True
+        return self._mobility is not None
 
-    def _limit(self, matrix: sp.csc_array, rows: sp.csr_array, chosen: Any) -> Ball | None:
-        """The inverse of B X^-1 B' for a part X of a matrix."""
-        part = sp.csc_array(sp.csr_array(matrix)[chosen][:, chosen])
+    @cached_property
+    def _massive(self) -> Mask:
+        """Degrees of freedom with mass."""
+        return np.asarray(self.M.diagonal() > 0)
+
+    @cached_property
+    def _mobility(self) -> Ball | None:
+        """B M^-1 B', or an entry of it where rows act on degrees of freedom without mass; None: M is not definite."""
+        massive = self._massive
+        if not np.any(massive) or sp.csr_array(self.M)[~massive].nnz:
+            return None
+        rows = self.rows[:1] if self.rows[:, ~massive].nnz else self.rows
+        part = sp.csc_array(sp.csr_array(self.M)[massive][:, massive])
         try:
-            return self._inverse(Pencil(part, sp.csr_array(rows)).compliance())
+            return Pencil(part, sp.csr_array(rows[:, massive])).compliance()
         except NotEnclosedError:
             return None
 
@@ -229,7 +234,7 @@ class DynamicStiffness:
         inverse = Inverse.of(S)
         if inverse is None:
             raise NotEnclosedError("S(mu) is not proven regular")
-        return inverse.solve(Ball.exact(np.eye(len(S.mid)))).symmetric
+        return inverse.whole().symmetric
 
 
 def _moved(rows: sp.csr_array, modes: Any) -> Ball:

@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from enumsol.decks.cards import DeckPlace, key
+from enumsol.decks.cards import DeckPlace, key, shown
 from enumsol.decks.faces import named_faces
 from enumsol.decks.model import Account, Deck, DeckRegion, Members, Surface
 from enumsol.decks.registry import Reading
@@ -171,7 +171,8 @@ class _Whole:
             if there[0]:
                 return rows
         words = {"NSET": "nodes", "ELSET": "elements"}[kind]
-        raise InvalidArgumentError(f"{place}: there is no set of {words} named {what}; expected *{kind}, {kind}={what}")
+        known = listed(each for of_kind, each in self.sets if of_kind == kind) or "none"
+        raise InvalidArgumentError(f"{place}: there is no set of {words} named {shown(what)}; expected one of {known}")
 
     def _nodes(self, elements: Integers) -> Integers:
         """Rows of the nodes of elements."""

@@ -13,7 +13,7 @@ from pathlib import Path
 
 import numpy as np
 
-from enumsol.decks.cards import DeckPlace, is_number, key
+from enumsol.decks.cards import DeckPlace, is_number, key, shown
 from enumsol.decks.elements import ElementType
 from enumsol.decks.steps import Analysis
 from enumsol.errors import InvalidArgumentError
@@ -330,7 +330,7 @@ class Deck:
             known = listed(sets) or "none"
             found = "is empty or not" if key(name) in sets else "is not"
             raise InvalidArgumentError(
-                f"{place}: {what} {name} {found} in the deck; expected a number or a set of {known}"
+                f"{place}: {what} {shown(name)} {found} in the deck; expected a number or a set of {known}"
             )
         return rows
 

@@ -5,19 +5,18 @@ Each function checks its argument, names it in messages, and gives plain arrays 
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import scipy.sparse as sp
-from scipy.sparse.csgraph import connected_components
 
-from enumsol.errors import InvalidArgumentError, InvalidProblemError
+from enumsol.errors import InvalidArgumentError
 from enumsol.fem.mesh_files import read_mesh
-from enumsol.fem.meshes import SAME
-from enumsol.fem.restrained import Supports
+from enumsol.fem.meshes import SAME, unit_vectors
+from enumsol.fem.restrained import RIGHT_ANGLE, Supports
 from enumsol.model.problem import given_friction, old_friction
 from enumsol.support.arguments import finite_number, one_of, shown
 from enumsol.support.array_arguments import real_array, short_vector
@@ -62,7 +61,14 @@ class Options:
     symmetry: Names
     displacement: Mapping[str, Sequence[Any]] | None
     displacement_slope: Mapping[str, Sequence[Any]] | None
+    transform: Mapping[str, Mapping[str, ArrayLike]] | None
+    tie: Sequence[Sequence[Any]]
+    reference: Vectors
+    rigid: Mapping[str, Names] | None
+    coupling: Mapping[str, Names] | None
+    equations: Sequence[Mapping[str, Any]]
     spring: Vectors
+    node_spring: Mapping[str, Any] | None
     load: Vectors
     load_slope: Vectors
     pressure: Mapping[str, float] | None
@@ -71,6 +77,8 @@ class Options:
     body_force_slope: ArrayLike | Mapping[str, ArrayLike] | None
     force: Vectors
     force_slope: Vectors
+    moment: Mapping[str, Any] | None
+    moment_slope: Mapping[str, Any] | None
     gap: float | Mapping[str, float]
     obstacle: Mapping[str, Sequence[float]] | None
     max_rigid_displacement: float | Literal["auto"] | None
@@ -149,12 +157,6 @@ def _in_python(option: str, part: str, number: str) -> str:
     return f'{option}={{"{part}": {number}}}' if part else f"{option}={number}"
 
 
-#: What is smaller in a combination of rigid motions is rounding.
-_ROUNDED = 1e-12
-#: Of the energies of rigid motions in the supports, the least as a share of the largest that holds a body.
-_HELD = 1e-10
-#: How many parts of a boundary are named to say which body it is.
-_NAMED = 3
 #: What stands for a component that is not given.
 FREE = "free"
 #: Numbers that an obstacle takes in 2D and 3D: a point and a normal, or a centre and a radius.
@@ -196,9 +198,12 @@ def supports_of(mesh: PartedMesh, options: Options, axis: Integers | None = None
     """
     shape = mesh.points.shape
     found = Supports.none(shape)
+    points, frames = by_part(options.reference, "reference"), frames_of(mesh, options.transform)
     for part in names_of(options.clamp, "clamp"):
+        if part in points:
+            continue
         for component in range(shape[1]):
-            _fix(found, part, mesh.nodes(part), component)
+            fix(found, part, mesh.nodes(part), component)
     for part in names_of(options.symmetry, "symmetry"):
         nodes = mesh.nodes(part)
         flat = _flat(mesh, nodes)
@@ -208,31 +213,44 @@ def supports_of(mesh: PartedMesh, options: Options, axis: Integers | None = None
                 f"symmetry {part} lies in {where} perpendicular to an axis; expected a part of the boundary in one "
                 "such plane"
             )
-        _fix(found, part, nodes, flat[0])
+        fix(found, part, nodes, flat[0])
         found.mirrored[nodes, flat[0]] = True
-    for part, given in displacements_of(options, shape[1]).items():
+    for part, given in displacements_of(options, shape[1], points).items():
+        if part in points:
+            continue
         nodes = mesh.nodes(part)
+        nodes = nodes[~frames.own[nodes]]
         for component, (value, slope) in given.items():
-            _fix(found, part, nodes, component, value, slope)
+            fix(found, part, nodes, component, value, slope)
         # rollers in a plane are a plane of symmetry, however they are given
-        if len(given) == 1 and (0.0, 0.0) in given.values() and _flat(mesh, nodes) == [*given]:
+        if len(nodes) and len(given) == 1 and (0.0, 0.0) in given.values() and _flat(mesh, nodes) == [*given]:
             found.mirrored[nodes, next(iter(given))] = True
     if axis is not None and len(axis):
-        _fix(found, "the axis of the axisymmetric body", axis, 0)
+        fix(found, "the axis of the axisymmetric body", axis, 0)
         found.mirrored[axis, 0] = True
     return found
 
 
-def displacements_of(options: Options, dimension: int) -> dict[str, dict[int, tuple[float, float]]]:
-    """Given displacements of parts by components, each at alpha = 0 and its derivative; one not given is 0."""
+def displacements_of(
+    options: Options, dimension: int, points: Iterable[str] = ()
+) -> dict[str, dict[int, tuple[float, float]]]:
+    """Given displacements of parts by components, each at alpha = 0 and its derivative; one not given is 0.
+
+    ``points`` are the names of reference points, of which rotations may be given as well.
+    """
     found: dict[str, dict[int, tuple[float, float]]] = {}
     for k, name in enumerate(("displacement", "displacement_slope")):
         for part, value in by_part(getattr(options, name), name).items():
-            for component, entry in _components(value, f"{name} of {part}", dimension).items():
+            rotations = dimension * (dimension - 1) // 2 if part in points and _long(value, dimension) else 0
+            for component, entry in _components(value, f"{name} of {part}", dimension + rotations).items():
                 both = [*found.setdefault(part, {}).get(component, (0.0, 0.0))]
                 both[k] = entry
                 found[part][component] = (both[0], both[1])
     return found
+
+
+def _long(value: object, dimension: int) -> bool:
+    return isinstance(value, (list, tuple, np.ndarray)) and len(value) > dimension
 
 
 def _components(value: object, name: str, dimension: int) -> dict[int, float]:
@@ -254,9 +272,14 @@ def _flat(mesh: PartedMesh, nodes: Integers) -> list[int]:
     return np.flatnonzero(np.ptp(mesh.points[nodes], axis=0) <= SAME * extent).tolist()
 
 
-def _fix(
-    supports: Supports, part: str, nodes: Integers, component: int, value: float = 0.0, slope: float = 0.0
-) -> None:
+def fix(supports: Supports, part: str, nodes: Integers, component: int, value: float = 0.0, slope: float = 0.0) -> None:
+    """Fix a component of nodes at value + alpha slope.
+
+    Raises
+    ------
+    InvalidArgumentError
+        It is fixed at another one already.
+    """
     fixed = supports.fixed
     for array, own, times in ((supports.values, value, ""), (supports.slopes, slope, " alpha")):
         differ = fixed[nodes, component] & (array[nodes, component] != own)
@@ -270,123 +293,88 @@ def _fix(
     fixed[nodes, component] = True
 
 
+# -- axes of nodes ---------------------------------------------------------------------------------------------------
+
+
 @dataclass(frozen=True)
-class BodyPiece:
-    """A connected body, separate from all others.
+class Frames:
+    """Axes of nodes, in which displacements, forces and springs at nodes are given.
 
     Attributes
     ----------
-    nodes : (N,) bool array
-        Which nodes are its own.
-    name : str
-        What messages call it: the names of parts of the body, or of the boundary, that it consists of.
-    axisymmetric : bool
-        Its only rigid motion is along the axis.
+    axes : (N, d, d) array
+        Rows of length one, perpendicular to each other.
+    own : (N,) bool array
+        Where they are not x, y (and z).
     """
 
-    nodes: Mask
-    name: str
-    axisymmetric: bool = False
-
-    def _motions(self, points: Floats, *, plain: bool = False) -> Floats:
-        """Rigid motions (d N, r) of its nodes, rotations in units of its extent and about its middle, or plain ones."""
-        own = points[self.nodes]
-        places = points if plain else (points - own.mean(axis=0)) / np.max(np.ptp(own, axis=0))
-        motions = rigid_motions(places)[:, 1:2] if self.axisymmetric else rigid_motions(places)
-        return np.where(np.repeat(self.nodes, points.shape[1])[:, None], motions, 0.0)
-
-    def free_motions(self, points: Floats, hold: sp.csc_array) -> int:
-        """Number of its rigid motions that nothing holds; ``hold`` is a stiffness of supports and springs."""
-        motions = self._motions(points)
-        values = np.linalg.eigvalsh(motions.T @ (hold @ motions))
-        return int(np.sum(values <= _HELD * max(values[-1], np.finfo(np.float64).tiny)))
-
-    def free_modes(self, points: Floats, hold: sp.csc_array) -> Floats:
-        """The rigid motions that nothing holds, (d N, r): translations and rotations, in as simple a form as possible.
-
-        Where supports or springs leave only some of them, they are combinations of a rotation and translations.
-        """
-        motions = self._motions(points)
-        count = self.free_motions(points, hold)
-        if count == motions.shape[1]:
-            return self._motions(points, plain=True)
-        _, vectors = np.linalg.eigh(motions.T @ (hold @ motions))
-        # echelon form: what is a translation becomes one exactly
-        table, row = vectors[:, :count].T.copy(), 0
-        for place in range(table.shape[1]):
-            best = row + int(np.argmax(np.abs(table[row:, place]))) if row < count else row
-            if row == count or abs(table[best, place]) <= _ROUNDED:
-                continue
-            table[[row, best]] = table[[best, row]]
-            table[row] /= table[row, place]
-            others = np.arange(count) != row
-            table[others] -= np.outer(table[others, place], table[row])
-            table[np.abs(table) <= _ROUNDED] = 0.0
-            row += 1
-        return np.asarray(motions @ table.T)
+    axes: Floats
+    own: Mask
 
 
-def pieces_of(mesh: PartedMesh, axisymmetric: bool = False) -> list[BodyPiece]:
-    """All connected bodies of a mesh, whose rigid motions are along the axis alone if they are axisymmetric."""
-    points, cells = mesh.points, mesh.cells
-    first = np.repeat(cells[:, :1], cells.shape[1] - 1, axis=1)
-    links = (np.ones(first.size), (first.ravel(), cells[:, 1:].ravel()))
-    count, piece_of = connected_components(sp.coo_array(links, shape=(len(points),) * 2), directed=False)
-    masks = [piece_of == piece for piece in range(count)]
-    names = ["the body" if count == 1 else _name_of(mesh, mask) for mask in masks]
-    return [BodyPiece(mask, name, axisymmetric) for mask, name in zip(masks, names, strict=True)]
-
-
-def _name_of(mesh: PartedMesh, inside: Mask) -> str:
-    """Name of one of several bodies."""
-    names = [name for name, rows in mesh.bodies.items() if np.all(inside[mesh.cells[rows]])]
-    if not names:
-        sides = [name for name, rows in mesh.facets.items() if np.all(inside[rows])]
-        more = ", ..." if len(sides) > _NAMED else ""
-        names = [f"the body with the boundary {', '.join(sides[:_NAMED])}{more}"] if sides else []
-    around = f"the part of the body around {mesh.points[np.argmax(inside)].tolist()}"
-    return ", ".join(names) if names else around
-
-
-def holding(supports: Supports, springs: sp.csc_array) -> sp.csc_array:
-    """A stiffness of supports and springs, the stiffest of each being one."""
-    largest = np.max(springs.diagonal(), initial=0.0)
-    hold = sp.csc_array(sp.diags_array(supports.fixed.ravel().astype(np.float64)))
-    return sp.csc_array(hold + springs / largest) if largest > 0 else hold
-
-
-def check_held(pieces: Sequence[BodyPiece], points: Floats, hold: sp.csc_array) -> None:
-    """Refuse bodies if one of them can move as a rigid body; ``hold`` is a stiffness of supports and springs.
+def frames_of(mesh: PartedMesh, transform: object) -> Frames:
+    """Axes that the option transform gives to nodes of parts.
 
     Raises
     ------
-    InvalidProblemError
-        One of them can; the message says which.
+    InvalidArgumentError
+        It is not of its form, a node is on the axis of a cylinder, or two parts give it different axes.
     """
-    for piece in pieces:
-        if piece.free_motions(points, hold):
-            raise InvalidProblemError(
-                f"{piece.name} is free to move as a rigid body; expected clamp, symmetry, displacement or spring to "
-                "hold it (contact alone does not); or max_rigid_displacement, if contact alone is to hold it"
+    count, d = mesh.points.shape
+    axes, own = np.tile(np.eye(d), (count, 1, 1)), np.zeros(count, dtype=bool)
+    for part, value in by_part(transform, "transform").items():
+        given, nodes = by_part(value, f"transform of {part}"), mesh.nodes(part)
+        if len(given) != 1 or next(iter(given)) not in ("rectangular", "cylindrical"):
+            raise InvalidArgumentError(
+                f"transform of {part} is {shown(value)}; expected rectangular or cylindrical with its numbers"
             )
+        ((kind, numbers),) = given.items()
+        entries = short_vector(numbers, f"{kind} of {part}", 2 if d == 2 else 6)
+        found = _along(entries, part) if kind == "rectangular" else _around(mesh.points[nodes], entries, part)
+        found = np.broadcast_to(found, (len(nodes), d, d))
+        differ = own[nodes] & np.any(np.abs(found - axes[nodes]) > RIGHT_ANGLE, axis=(1, 2))
+        if np.any(differ):
+            raise InvalidArgumentError(
+                f"transform of {part} gives node {nodes[np.argmax(differ)]} other axes than that of another part; "
+                "expected one"
+            )
+        axes[nodes], own[nodes] = found, True
+    return Frames(axes, own)
 
 
-def rigid_modes_of(pieces: Sequence[BodyPiece], points: Floats, hold: sp.csc_array) -> Floats | None:
-    """The rigid motions of bodies that nothing holds, (d N, r); None if there are none."""
-    modes = np.hstack([piece.free_modes(points, hold) for piece in pieces])
-    return modes if modes.shape[1] else None
+def _along(numbers: Floats, part: str) -> Floats:
+    """Axes along directions: x' and, in 3D, one in the plane of x' and y'."""
+    first, second = (numbers, np.array([-numbers[1], numbers[0]])) if len(numbers) == 2 else np.split(numbers, 2)
+    third = np.cross(first, second) if len(numbers) == 6 else None
+    if not np.linalg.norm(first) > 0 or (
+        third is not None and np.linalg.norm(third) <= RIGHT_ANGLE * np.linalg.norm(first) * np.linalg.norm(second)
+    ):
+        raise InvalidArgumentError(
+            f"rectangular of {part} is {shown(numbers.tolist())}; expected a direction, in 3D two that are not parallel"
+        )
+    rows = [first, second] if third is None else [first, np.cross(third, first), third]
+    return unit_vectors(np.array(rows), "axes")
 
 
-def rigid_motions(places: Floats) -> Floats:
-    """Translations, and rotations about the origin, of nodes at these places (N, d): (d N, 3) or (d N, 6)."""
-    count, dimension = places.shape
-    motions = [np.tile(axis, (count, 1)) for axis in np.eye(dimension)]
-    for one in range(dimension):
-        for two in range(one):
-            turned = np.zeros((count, dimension))
-            turned[:, one], turned[:, two] = places[:, two], -places[:, one]
-            motions.append(turned)
-    return np.stack([motion.ravel() for motion in motions], axis=1)
+def _around(points: Floats, numbers: Floats, part: str) -> Floats:
+    """Axes of nodes around a centre or, in 3D, around the line through two points: radial, tangential, axial."""
+    centre, ahead = (numbers, np.array([0.0, 0.0, 1.0])) if len(numbers) == 2 else np.split(numbers, 2)
+    if len(numbers) == 6:
+        ahead = ahead - centre
+        ahead = ahead / max(float(np.linalg.norm(ahead)), np.finfo(np.float64).tiny)
+    offset = points - centre
+    if len(numbers) == 6:
+        offset = offset - (offset @ ahead)[:, None] * ahead
+    far = np.linalg.norm(offset, axis=1)
+    if not np.min(far) > SAME * np.max(far) or not np.any(ahead):
+        raise InvalidArgumentError(
+            f"cylindrical of {part} is {shown(numbers.tolist())}, and a node is on this axis or it has no direction; "
+            "expected a centre, in 3D two points of the axis, away from the nodes"
+        )
+    radial = offset / far[:, None]
+    if len(numbers) == 2:
+        return np.stack([radial, np.stack([-radial[:, 1], radial[:, 0]], axis=1)], axis=1)
+    return np.stack([radial, np.cross(ahead, radial), np.broadcast_to(ahead, radial.shape)], axis=1)
 
 
 # -- loads and springs -----------------------------------------------------------------------------------------------
@@ -400,8 +388,11 @@ def nodal_forces(body: NodalBasis, mesh: PartedMesh, options: Options, slope: st
     total = part_forces(body, mesh, loads, pressures, slope)
     if volume is not None:
         total += body.volume_forces(body_force_of(mesh, volume, f"body_force{slope}"))
+    points, axes = by_part(options.reference, "reference"), frames_of(mesh, options.transform).axes
     for part, value in by_part(forces, f"force{slope}").items():
-        total[mesh.nodes(part)] += short_vector(value, f"force{slope} of {part}", mesh.points.shape[1])
+        if part not in points:
+            nodes = mesh.nodes(part)
+            total[nodes] += short_vector(value, f"force{slope} of {part}", mesh.points.shape[1]) @ axes[nodes]
     return total
 
 

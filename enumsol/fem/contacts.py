@@ -59,8 +59,8 @@ class Pair:
     gap: float | None = None
 
     @classmethod
-    def of(cls, value: Sequence[Any]) -> Pair:
-        """The pair given by two names, or by two names and a gap.
+    def of(cls, value: Sequence[Any], option: str = "pairs") -> Pair:
+        """The pair given by two names, or by two names and a gap (of a tie the largest one).
 
         Raises
         ------
@@ -70,11 +70,11 @@ class Pair:
         names = value[:2] if isinstance(value, (list, tuple)) and len(value) in (2, 3) else ()
         if not names or not all(isinstance(name, str) for name in names):
             raise InvalidArgumentError(
-                f"pairs has the entry {shown(value)}; expected two names of parts, and a gap if it is not that of the "
-                "mesh"
+                f"{option} has the entry {shown(value)}; expected two names of parts, and a gap if it is not that of "
+                "the mesh"
             )
         if names[0] == names[1]:
-            raise InvalidArgumentError(f"pairs has {names[0]} with itself; expected two different parts")
+            raise InvalidArgumentError(f"{option} has {names[0]} with itself; expected two different parts")
         gap = finite_number(value[2], f"gap of the pair {names[0]}:{names[1]}") if len(value) > 2 else None
         return cls(names[0], names[1], gap)
 
@@ -265,13 +265,9 @@ def _paired(
     body: NodalBasis, mesh: PartedMesh, touching: Integers, normals: Floats, held: Supports, pair: Pair
 ) -> tuple[ContactRows, Floats, Group]:
     """Nodes that face the other part of a pair, relative to it."""
-    facets = _facets(body, {pair.master: mesh.part(pair.master)})
-    apart = ~np.isin(touching, facets)  # a node of both, as at the tip of a crack, is in contact with itself
+    apart = ~np.isin(touching, mesh.part(pair.master))  # of both, as at the tip of a crack: in contact with itself
     touching, normals = touching[apart], normals[apart]
-    boundary = boundary_facets(mesh.points.shape[1], mesh.cells)
-    others = boundary[np.isin(facet_rows(mesh.points.shape[1], boundary, facets), -1)]
-    outward = body.on_part(facets, pair.master, np.asarray)
-    found, weights, distances = faced(mesh.points, touching, normals, facets, outward, others)
+    found, weights, distances = facing(body, mesh, touching, normals, pair.master)
     if not len(distances):
         raise InvalidArgumentError(
             f"{pair.slave} of the pair {pair} has no node that faces a facet of {pair.master} along its normal; "
@@ -283,6 +279,27 @@ def _paired(
     nodes = movable(touching, normals, held, means)
     gaps = distances if pair.gap is None else np.full(len(touching), pair.gap)
     return nodes, gaps[nodes.kept], Group([pair.slave], pair, normals[nodes.kept], len(nodes.nodes), missed)
+
+
+def facing(
+    body: NodalBasis, mesh: PartedMesh, nodes: Integers, normals: Floats, master: str
+) -> tuple[Mask, sp.csr_array, Floats]:
+    """The points of a part that nodes face along their normals, as in `faced`."""
+    facets = _facets(body, {master: mesh.part(master)})
+    boundary = boundary_facets(mesh.points.shape[1], mesh.cells)
+    others = boundary[np.isin(facet_rows(mesh.points.shape[1], boundary, facets), -1)]
+    outward = body.on_part(facets, master, np.asarray)
+    return faced(mesh.points, nodes, normals, facets, outward, others)
+
+
+def facing_normals(body: NodalBasis, mesh: PartedMesh, part: str) -> tuple[Integers, Floats]:
+    """All nodes of a part, and the means of the normals of the facets around them, which corners have as well."""
+    facets = _facets(body, {part: mesh.part(part)})
+    of_facets = unit_vectors(body.on_part(facets, part, np.asarray)[facets].sum(axis=1), f"normals of {part}")
+    sums = np.zeros(mesh.points.shape)
+    np.add.at(sums, facets.ravel(), np.repeat(of_facets, facets.shape[1], axis=0))
+    nodes = np.unique(facets)
+    return nodes, unit_vectors(sums[nodes], f"normals of {part}")
 
 
 def along(edges: Integers) -> Integers:

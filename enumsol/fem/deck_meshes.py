@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from enumsol.decks.faces import face_nodes, uncollapsed
+from enumsol.decks.faces import face_nodes
 from enumsol.errors import InvalidArgumentError
 from enumsol.support.messages import counted
 
@@ -93,39 +93,58 @@ def deck_mesh(deck: Deck, *, spelled: bool = False) -> DeckMesh:
         There are no bodies, or elements of another kind that carry something, or of which something is lost.
     """
     bodies, shapes = _bodies(deck)
+    types = () if shapes else dict.fromkeys(deck.blocks[k].type.name for k in bodies)
     of = deck.spelled if spelled else {}
-    made = DeckMesh(deck.points, types=list(dict.fromkeys(deck.blocks[k].type.name for k in bodies if not shapes)))
-    dimension = deck.blocks[bodies[0]].type.shape.dimension
+    made = DeckMesh(deck.points, types=list(types))
     firsts = np.cumsum([0, *(len(block.labels) for block in deck.blocks)])
-    sets = {of.get(name, name): rows for name, rows in deck.element_sets.items()}
+    for k in bodies:
+        _add_body(made, deck, k, int(firsts[k]), of)
+    for name, faces in _facets(deck, bodies, firsts).items():
+        for shape, nodes in face_nodes(deck, faces):
+            sets = {of.get(name, name): np.arange(len(nodes))} if name else {}
+            made.add(shape.name, nodes, np.zeros(len(nodes), dtype=np.int64), sets)
+    made.point_sets = {of.get(name, name): rows for name, rows in deck.node_sets.items()}
+    for name, surface in deck.surfaces.items():
+        if surface.nodes is not None:
+            other = made.point_sets.setdefault(of.get(name, name), surface.nodes)
+            if not np.array_equal(other, surface.nodes):
+                raise InvalidArgumentError(
+                    f"{surface.place}: the surface {name} has other nodes than the set {name}; expected other names"
+                )
+    return made.closed()
+
+
+def _facets(deck: Deck, bodies: list[int], firsts: Integers) -> dict[str, Integers]:
+    """Faces (k, 2) of surfaces, and elements that only carry names, as in `Surface`, by the keys of their names.
+
+    If no set names any of the elements that carry none, all of them are there without a name.
+    """
+    dimension = deck.blocks[bodies[0]].type.shape.dimension
     covered = np.zeros(len(deck.points), dtype=bool)
     for k in bodies:
         covered[deck.blocks[k].nodes] = True
-        _add(made, deck.blocks[k], int(firsts[k]), sets)
-    surfaces = {of.get(name, name): own for name, own in deck.surfaces.items()}
+    carriers = np.zeros(firsts[-1], dtype=bool)
     for k, block in enumerate(deck.blocks):
         if k not in bodies:
             _check_carrier(deck, block, int(firsts[k]), dimension, covered)
-            if block.type.shape.dimension == dimension - 1 and _carries_names(block, covered):
-                _add(made, block, int(firsts[k]), {name: rows for name, rows in sets.items() if name not in surfaces})
-    made.point_sets = {of.get(name, name): rows for name, rows in deck.node_sets.items()}
-    for name, surface in surfaces.items():
-        if surface.nodes is not None:
-            if not np.array_equal(made.point_sets.setdefault(name, surface.nodes), surface.nodes):
-                raise InvalidArgumentError(
-                    f"{surface.place}: the surface {name} has other nodes than the set {name}; expected "
-                    "names that differ"
-                )
-            continue
-        for shape, nodes in face_nodes(deck, surface.faces):
-            made.add(shape.name, nodes, np.zeros(len(nodes), dtype=np.int64), {name: np.arange(len(nodes))})
-    return made.closed()
+            own = np.all(covered[block.nodes], axis=1) & (block.type.shape.dimension == dimension - 1)
+            carriers[firsts[k] : firsts[k + 1]] = own
+    found = {name: _themselves(rows[carriers[rows]]) for name, rows in deck.element_sets.items()}
+    found = {name: faces for name, faces in found.items() if len(faces)}
+    if np.any(carriers) and not found:
+        found = {"": _themselves(np.flatnonzero(carriers))}
+    return found | {name: own.faces for name, own in deck.surfaces.items() if own.nodes is None}
+
+
+def _themselves(rows: Integers) -> Integers:
+    """Elements as the faces that they are."""
+    return np.column_stack([rows, np.full(len(rows), -1)])
 
 
 def _bodies(deck: Deck) -> tuple[list[int], bool]:
     """Blocks of the bodies, and whether their types stand for shapes alone."""
     shapes = _WRITTEN_BY_SHAPE in deck.heading
-    own = [k for k, block in enumerate(deck.blocks) if block.type.is_body or shapes]
+    own = [k for k, block in enumerate(deck.blocks) if len(block.labels) and (block.type.is_body or shapes)]
     dimension = max((deck.blocks[k].type.shape.dimension for k in own), default=0)
     bodies = [k for k in own if deck.blocks[k].type.shape.dimension == dimension]
     if dimension < 2:
@@ -140,22 +159,15 @@ def _bodies(deck: Deck) -> tuple[list[int], bool]:
     return bodies, shapes
 
 
-def _add(made: DeckMesh, block: ElementBlock, first: int, sets: dict[str, Integers]) -> None:
-    """Add the elements of a block by their shapes, collapsed ones as what they are."""
-    for shape, rows, nodes in uncollapsed(block.type.shape, block.nodes):
-        data = nodes[:, shape.to_vtk] if shape.to_vtk else nodes
-        place = np.full(len(block.labels), -1)
-        place[rows] = np.arange(len(rows))
-        names = {}
-        for name, members in sets.items():
-            own = place[members[(members >= first) & (members < first + len(block.labels))] - first]
-            if np.any(own >= 0):
-                names[name] = own[own >= 0]
-        made.add(shape.name, data, block.labels[rows], names)
-
-
-def _carries_names(block: ElementBlock, covered: Mask) -> bool:
-    return bool(np.all(covered[block.nodes]))
+def _add_body(made: DeckMesh, deck: Deck, k: int, first: int, of: dict[str, str]) -> None:
+    """Add the elements of a block."""
+    block, sets = deck.blocks[k], {}
+    for name, rows in deck.element_sets.items():
+        own = rows[(rows >= first) & (rows < first + len(block.labels))] - first
+        if len(own):
+            sets[of.get(name, name)] = own
+    shape = block.type.shape
+    made.add(shape.name, block.nodes[:, shape.to_vtk] if shape.to_vtk else block.nodes, block.labels, sets)
 
 
 def _check_carrier(deck: Deck, block: ElementBlock, first: int, dimension: int, covered: Mask) -> None:
@@ -170,7 +182,7 @@ def _check_carrier(deck: Deck, block: ElementBlock, first: int, dimension: int, 
                 f"line {section.place.line}); expected solid or plane elements only, or --ignore {kind.name} to do "
                 "without them"
             )
-    lies_on_bodies = kind.shape.dimension < dimension and _carries_names(block, covered)
+    lies_on_bodies = kind.shape.dimension < dimension and np.all(covered[block.nodes])
     if not lies_on_bodies and (kind.shape.dimension >= 2 or kind.family not in _LEFT_OUT):
         lost = counted(int(np.sum(~np.all(covered[block.nodes], axis=1))), "element")
         raise InvalidArgumentError(

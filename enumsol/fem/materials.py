@@ -23,8 +23,8 @@ if TYPE_CHECKING:
 
 T = TypeVar("T")
 
-#: Names of the states of plane bodies, and the rows of moduli in 3D that are theirs; stress across is none in the last.
-PLANES = {"strain": [0, 1, 3], "axisymmetric": [0, 1, 2, 3], "stress": [0, 1, 3]}
+#: Names of the states of plane bodies, and the rows of strains in 3D that are theirs.
+PLANES = {"strain": [0, 1, 3], "stress": [0, 1, 3], "axisymmetric": [0, 1, 2, 3]}
 _AXISYMMETRIC = "axisymmetric"
 
 

@@ -11,11 +11,15 @@ from collections.abc import Callable, Mapping
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any, Literal, TypeVar
 
+import scipy.sparse as sp
+
 from enumsol.errors import InvalidArgumentError, InvalidProblemError
 from enumsol.fem import conditions
 from enumsol.fem.bases import AXISYMMETRIC_DEGREE, nodal_basis
+from enumsol.fem.bodies import pieces_of
 from enumsol.fem.conditions import Options, refuse_old_friction
 from enumsol.fem.contacts import contacts_of
+from enumsol.fem.joints import joints_of
 from enumsol.fem.materials import (
     is_axisymmetric,
     masses_of,
@@ -63,6 +67,7 @@ def scene_of(source: PartedMesh | str | os.PathLike[str] | Any, options: Options
     body = nodal_basis(mesh.points, mesh.cells, AXISYMMETRIC_DEGREE if axisymmetric else 0, mesh.labels)
     body = replace(body, thickness=thickness, axisymmetric=axisymmetric)
     held = conditions.supports_of(mesh, options, nodes_on_axis(mesh.points) if axisymmetric else None)
+    joints = joints_of(body, mesh, options, held)
     masses = masses_of(mesh, options.density, thickness)
     contacts = contacts_of(body, mesh, options, held)
     forces, slope = (conditions.nodal_forces(body, mesh, options, which) for which in ("", "_slope"))
@@ -70,8 +75,11 @@ def scene_of(source: PartedMesh | str | os.PathLike[str] | Any, options: Options
     if options.temperature is not None:
         warmed, stress = thermal_forces(body, mesh, options, material)
         forces = forces + warmed
-    springs, pieces = conditions.part_springs(body, mesh, options.spring), conditions.pieces_of(mesh, axisymmetric)
-    scene = Scene(mesh, options, body, held, contacts, forces, slope, springs, material, pieces, masses, stress)
+    springs = joints.padded(conditions.part_springs(body, mesh, options.spring)) + joints.springs
+    scene = Scene(
+        mesh, options, body, held, joints, contacts, forces, slope, sp.csc_array(springs), material,
+        pieces_of(mesh, axisymmetric), masses, stress,
+    )  # fmt: skip
     refuse_overlaps(scene)
     refuse_walls(scene)
     refuse_pairs(scene)
@@ -124,7 +132,14 @@ def mesh_problem(
     symmetry: Names = (),
     displacement: Mapping[str, Sequence[Any]] | None = None,
     displacement_slope: Mapping[str, Sequence[Any]] | None = None,
+    transform: Mapping[str, Mapping[str, ArrayLike]] | None = None,
+    tie: Sequence[Sequence[Any]] = (),
+    reference: Vectors = None,
+    rigid: Mapping[str, Names] | None = None,
+    coupling: Mapping[str, Names] | None = None,
+    equations: Sequence[Mapping[str, Any]] = (),
     spring: Vectors = None,
+    node_spring: Mapping[str, Any] | None = None,
     load: Vectors = None,
     load_slope: Vectors = None,
     pressure: Mapping[str, float] | None = None,
@@ -133,6 +148,8 @@ def mesh_problem(
     body_force_slope: ArrayLike | Mapping[str, ArrayLike] | None = None,
     force: Vectors = None,
     force_slope: Vectors = None,
+    moment: Mapping[str, Any] | None = None,
+    moment_slope: Mapping[str, Any] | None = None,
     gap: float | Mapping[str, float] = 0.0,
     obstacle: Mapping[str, Sequence[float]] | None = None,
     max_rigid_displacement: float | Literal["auto"] | None = None,
@@ -197,8 +214,28 @@ def mesh_problem(
     displacement, displacement_slope : mapping of names to components
         Given displacements in x, y (and z), and their derivatives with respect to alpha, each a number [length], or
         ``"free"`` or None where it is not given. With a slope the last entry of u is alpha.
+    transform : mapping of names to {"rectangular": numbers} or {"cylindrical": numbers}
+        Axes of the nodes of a part, in which displacements, forces and ``node_spring`` of any part are given at them.
+        Rectangular: the first axis, in 3D followed by a direction in the plane of the first two; cylindrical: the
+        centre, in 3D two points of the axis, for radial, tangential (and axial) ones.
+    tie : sequence of (slave, master) or (slave, master, largest gap)
+        Parts that are joined: each node of the first moves as the point of the second that it faces does, found as for
+        pairs.
+    reference : mapping of names to positions
+        Reference points, which move and turn. ``clamp``, ``displacement`` (in 3D with rotations rx, ry, rz, in 2D with
+        rz after the displacements [rad]), ``force``, ``moment`` and ``node_spring`` may name them.
+    rigid, coupling : mapping of names of reference points to name or names of parts
+        Nodes that move with the reference point as a rigid body; or nodes which the reference point follows in the
+        mean, so that its force and moment are distributed over them and nothing is stiffened.
+    equations : sequence of {"terms": [[node, component, coefficient], ...], "value": float, "slope": float}
+        Linear equations: the sum of coefficients times displacements is value + alpha slope (0 if not given). A node is
+        its number, the name of a set of one, or a reference point; components are "x", "y" (and "z"), of reference
+        points also "rz", in 3D "rx", "ry", "rz".
     spring : mapping of names to (kn, kt)
         Springs to the ground along the normal and across it, per area (in 2D per length) [force / length^3].
+    node_spring : mapping of names to stiffnesses
+        Springs to the ground in x, y (and z) at each node of a part; or, named "A:B", between two nodes (sets of one,
+        or numbers), and then also one stiffness, along the line between them [force / length].
     load, load_slope : mapping of names to vectors
         Force per area (in 2D per length) in x, y (and z), and its derivative with respect to alpha [force / length^2].
     pressure, pressure_slope : mapping of names to float
@@ -209,6 +246,8 @@ def mesh_problem(
     force, force_slope : mapping of names to vectors
         Force on each node of a part or set of nodes in x, y (and z), in 2D of the whole thickness, and its derivative
         with respect to alpha [force].
+    moment, moment_slope : mapping of names of reference points to float, in 3D to (3,) array_like
+        Moments on reference points, and their derivatives with respect to alpha [force length].
     gap : float, or mapping of names to float
         Initial gap along the normals, for all contact nodes or, like friction, by parts (0 for parts that are not
         named), in addition to the distance to the obstacle or within a pair; a negative gap is a press fit [length].
@@ -253,9 +292,11 @@ def mesh_problem(
         expansion=expansion, temperature=temperature, density=density,
         friction=friction, friction_slope=friction_slope, friction2=friction2, friction2_slope=friction2_slope,
         axis=axis, clamp=clamp, symmetry=symmetry, displacement=displacement,
-        displacement_slope=displacement_slope, spring=spring,
+        displacement_slope=displacement_slope, transform=transform, tie=tie, reference=reference, rigid=rigid,
+        coupling=coupling, equations=equations, spring=spring, node_spring=node_spring,
         load=load, load_slope=load_slope, pressure=pressure, pressure_slope=pressure_slope, body_force=body_force,
         body_force_slope=body_force_slope, force=force, force_slope=force_slope,
+        moment=moment, moment_slope=moment_slope,
         gap=gap, obstacle=obstacle, max_rigid_displacement=max_rigid_displacement, groups=groups,
     )  # fmt: skip
     return scene_of(mesh, given).problem()

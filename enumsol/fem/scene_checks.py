@@ -10,7 +10,7 @@ import scipy.sparse as sp
 from enumsol.decks.elements import element_type
 from enumsol.errors import InvalidArgumentError
 from enumsol.fem.bases import SIMPLICES, corners_of, place_of
-from enumsol.fem.conditions import holding
+from enumsol.fem.bodies import holding
 from enumsol.fem.contacts import Group, faced
 from enumsol.fem.meshes import SAME, PartedMesh, cell_name, unit_vectors
 from enumsol.fem.scenes import Scene
@@ -204,7 +204,10 @@ def _unjoined(scene: Scene) -> list[str]:
     boundary = np.unique(boundary_facets(scene.dimension, mesh.cells))
     near = SAME * float(np.max(np.ptp(mesh.points, axis=0)))
     twins = boundary[cKDTree(mesh.points[boundary]).query_pairs(near, output_type="ndarray")]
-    for mask in (_nodes_of(mesh, group) for group in scene.contacts.groups):
+    joined = np.zeros(scene.springs.shape[0], dtype=bool)
+    joined[scene.joints.rows.indices] = True
+    masks = [_nodes_of(mesh, group) for group in scene.contacts.groups]
+    for mask in (*masks, np.any(joined[: mesh.points.size].reshape(mesh.points.shape), axis=1)):
         twins = twins[~np.all(mask[twins], axis=1)]
     notes = []
     for one in range(len(names)):
@@ -235,8 +238,8 @@ def _nodes_of(mesh: PartedMesh, group: Group) -> Mask:
 def _turning(scene: Scene) -> list[str]:
     """Notes on pairs of a body that could roll, whose normals turn along the contact more than what they face does."""
     mesh, notes, first = scene.mesh, [], 0
-    hold = holding(scene.held, sp.csc_array(scene.springs.shape))
-    loose = np.any([piece.nodes for piece in scene.pieces if piece.free_motions(mesh.points, hold)], axis=0)
+    hold = holding(scene.held, sp.csc_array(scene.springs.shape), scene.joints.rows)
+    loose = np.any([piece.nodes for piece in scene.moving if piece.free_motions(mesh.points, hold)], axis=0)
     for group in scene.contacts.groups:
         rows, first = scene.contacts.rows.means[first : first + group.count], first + group.count
         pair = group.pair
@@ -256,7 +259,7 @@ def _turning(scene: Scene) -> list[str]:
 
 def _unfaced(scene: Scene) -> list[str]:
     """Nodes of pairs without contact."""
-    return [
+    return scene.joints.notes + [
         f"{group.missed} of {group.missed + group.count} nodes of {pair.slave} face nothing of "
         f"{pair.master} and have no contact"
         for group in scene.contacts.groups
@@ -276,21 +279,27 @@ def _shared(scene: Scene) -> list[str]:
 
 def _alone(scene: Scene) -> list[str]:
     """Bodies that nothing connects with the others."""
-    if len(scene.pieces) < 2:
+    if len(scene.moving) < 2:
         return []
     touched = np.zeros(len(scene.mesh.points), dtype=bool)
     touched[np.unique(scene.contacts.rows.means.indices)] = True
     return [
         f"{piece.name} touches nothing: it has no contact part and is in no pair"
-        for piece in scene.pieces
+        for piece in scene.moving
         if not np.any(touched & piece.nodes)
     ]
 
 
 def _rest(scene: Scene) -> list[str]:
     """Nothing that acts on the bodies."""
-    acting = np.any(scene.forces) or np.any(scene.slope) or np.any(scene.held.values) or np.any(scene.held.slopes)
-    if acting or np.any(scene.gaps < 0):
+    joints = scene.joints
+    acting = (
+        any(np.any(own) for own in (scene.forces, scene.slope, joints.forces, joints.slope))
+        or np.any(scene.held.values)
+        or np.any(scene.held.slopes)
+    )
+    given = any(own.value or own.slope for own in joints.equations)
+    if acting or given or np.any(scene.gaps < 0):
         return []
     return ["nothing acts on the body: it has no load, press fit or given displacement, and rests"]
 
@@ -304,10 +313,10 @@ def _loaded_contact(scene: Scene) -> list[str]:
             if any(tuple(sorted(row)) in corners for row in scene.mesh.part(part).tolist()):
                 what = "stiffens" if option == "spring" else "acts on"
                 notes.append(f"{option} of {part} {what} contact nodes, as {part} is in contact")
-    touching = scene.contacts.rows.nodes
+    touching, points = scene.contacts.rows.nodes, scene.joints.references.places
     for option in ("force", "force_slope"):
         named = getattr(scene.options, option) or ()
-        on = [part for part in named if np.any(np.isin(scene.mesh.nodes(part), touching))]
+        on = [part for part in named if part not in points and np.any(np.isin(scene.mesh.nodes(part), touching))]
         notes += [f"{option} of {part} acts on contact nodes" for part in on]
     return notes
 
@@ -348,7 +357,7 @@ def _stiffness(scene: Scene) -> Floats:
 def _proportions(scene: Scene) -> list[str]:
     """Notes on loads and press fits, or gaps that only strain can close, that are out of proportion."""
     strain, extent, notes = max(_strains(scene).values()), _extent(scene), []
-    held = not scene.options.spring and not any(p.free_motions(scene.mesh.points, scene.hold) for p in scene.pieces)
+    held = not scene.options.spring and not any(p.free_motions(scene.mesh.points, scene.hold) for p in scene.moving)
     for group, gaps in scene.gaps_of_groups:
         length = float(gaps.min())
         ratio = abs(length) / extent / strain if strain > 0 else 1.0
@@ -408,6 +417,6 @@ def _held(scene: Scene) -> list[str]:
     """A bound of rigid displacements where nothing can move as a whole."""
     if scene.options.max_rigid_displacement is None:
         return []
-    if any(piece.free_motions(scene.mesh.points, scene.hold) for piece in scene.pieces):
+    if any(piece.free_motions(scene.mesh.points, scene.hold) for piece in scene.moving):
         return []
     return ["max_rigid_displacement has no effect, for supports or springs hold everything"]

@@ -11,10 +11,12 @@ import numpy as np
 import scipy.sparse as sp
 
 from enumsol.errors import InvalidArgumentError
-from enumsol.fem import conditions
+from enumsol.fem import bodies, conditions
 from enumsol.fem.bases import NodalBasis
+from enumsol.fem.bodies import BodyPiece
 from enumsol.fem.conditions import FRICTION, Options
 from enumsol.fem.contacts import Contacts, Group
+from enumsol.fem.joints import Joints
 from enumsol.fem.meshes import PartedMesh, unit_vectors
 from enumsol.fem.restrained import Body, Supports, axes_of, problem_of
 from enumsol.model.cells import KINDS, boundary_facets, by_kind, facet_outlines, lines_along
@@ -58,10 +60,12 @@ class Scene:
     options : Options
     body : NodalBasis
     held : Supports
+    joints : Joints
     contacts : Contacts
     forces, slope : (N, d) arrays
         On all nodes, and their derivatives with respect to alpha [force].
-    springs : (d N, d N) csc_array
+    springs : (m, m) csc_array
+        Of all displacements, those of reference points after those of nodes.
     material : Material
     pieces : list of BodyPiece
         The connected bodies.
@@ -77,12 +81,13 @@ class Scene:
     options: Options
     body: NodalBasis
     held: Supports
+    joints: Joints
     contacts: Contacts
     forces: Floats
     slope: Floats
     springs: sp.csc_array
     material: Material
-    pieces: list[conditions.BodyPiece]
+    pieces: list[BodyPiece]
     masses: Floats | None = None
     stress: Floats | None = None
     notes: list[str] = field(default_factory=list)
@@ -129,8 +134,14 @@ class Scene:
 
     @cached_property
     def hold(self) -> sp.csc_array:
-        """A stiffness of supports and springs, (d N, d N)."""
-        return conditions.holding(self.held, self.springs)
+        """A stiffness of supports, equations and springs, (m, m)."""
+        return bodies.holding(self.held, self.springs, self.joints.rows)
+
+    @cached_property
+    def moving(self) -> list[BodyPiece]:
+        """The bodies, those that equations or springs join as one."""
+        links = sp.csr_array(sp.vstack([self.joints.rows, self.joints.springs]))
+        return bodies.joined(self.pieces, self.mesh, links) if links.nnz else self.pieces
 
     def uses(self, part: str) -> list[str]:
         """Uses of a part of the boundary, as the options name it."""
@@ -147,6 +158,7 @@ class Scene:
             "bodies": _bodies(self),
             "material": _material(self),
             "parts": _parts(self),
+            "joints": self.joints.said,
             "loads": _loads(self),
             "contact": _contact(self),
             "note": self.notes,
@@ -177,10 +189,22 @@ class Scene:
             surface, more = outward(contacts.facets, mesh.cells), {"areas": contacts.areas}
         gaps, coefficients = self.gaps, self.coefficients
         modes, bound = self._rigid_modes()
-        stiffness = sp.csc_array(self.body.stiffness(self.material.elasticity) + self.springs)
+        elastic = self.body.stiffness(self.material.elasticity)
+        stiffness = sp.csc_array(self.joints.padded(elastic) + self.springs)
+        forces, slope = (
+            np.append(own, more) for own, more in ((self.forces, self.joints.forces), (self.slope, self.joints.slope))
+        )
+        named = self.joints.references.named
         axes = _axes(nodes, self.options.axis, self.dimension)
         problem = problem_of(
-            Body(stiffness, self.forces.ravel(), self.slope.ravel() if np.any(self.slope) else None, supports),
+            Body(
+                stiffness,
+                forces,
+                slope if np.any(slope) else None,
+                supports,
+                equations=self.joints.equations,
+                named=named,
+            ),
             nodes,
             axes,
             modes=modes,
@@ -205,20 +229,20 @@ class Scene:
         }
 
     def _mass(self) -> sp.csc_array | None:
-        """Consistent mass before supports, (d N, d N), if it is not uniform or was given."""
+        """Consistent mass before supports, (m, m), if it is not uniform or was given."""
         if self.masses is None:
             return None
         of_nodes = consistent_mass(self.mesh.points, self.mesh.cells, self.masses, axisymmetric=self.body.axisymmetric)
-        return sp.csc_array(sp.kron(of_nodes, sp.eye_array(self.dimension)))
+        return self.joints.padded(sp.csc_array(sp.kron(of_nodes, sp.eye_array(self.dimension))))
 
     def _rigid_modes(self) -> tuple[Floats | None, float | None]:
         """Rigid motions that nothing holds, if a bound for them is given, and the bound; None: the default."""
-        bound, about = self.options.max_rigid_displacement, (self.pieces, self.mesh.points, self.hold)
+        bound, about = self.options.max_rigid_displacement, (self.moving, self.mesh.points, self.hold)
         if bound is None:
-            conditions.check_held(*about)
+            bodies.check_held(*about)
             return None, None
         largest = None if bound == "auto" else positive_number(bound, "max_rigid_displacement")
-        modes = conditions.rigid_modes_of(*about)
+        modes = bodies.rigid_modes_of(*about)
         return modes, None if modes is None else largest
 
     def plot(self, *, units: tuple[str, str] | None = None, file: str | os.PathLike[str] | None = None) -> Any:
@@ -305,7 +329,7 @@ def _bodies(scene: Scene) -> list[str]:
         return f"{counted(len(rows), 'cell')}, {what} {np.sum(sizes[rows]):.6g}"
 
     lines, said = [], set()
-    for piece in scene.pieces:
+    for piece in scene.moving:
         free = piece.free_motions(mesh.points, scene.hold)
         modes = f"{counted(free, 'rigid mode')} that nothing but contact holds" if free else "held"
         lines.append(f"{piece.name}: {size(np.flatnonzero(np.all(piece.nodes[mesh.cells], axis=1)))}, {modes}")

@@ -272,7 +272,7 @@ def on_table(
 
     The tangents are x and, in 3D, -y; the normal is downward.
     """
-    from enumsol.fem.conditions import rigid_motions  # what it needs is not for the list of problems
+    from enumsol.fem.bodies import rigid_motions  # what it needs is not for the list of problems
 
     d, ones = points.shape[1], np.ones(len(nodes))
     *tangents, normal = (

@@ -426,32 +426,40 @@ class OnlyReference(ClosingRecord):
     rows : list of rows on displacements that are equations
     products : list of (row, row, factor)
     enclosure : EnclosureRecord or None
+    turns : array or None
+        In 3D, theta with which no other root is left at all; then there are no rows.
     """
 
-    kind, sizes, trees = "o", (4, 7), Tree.FLOATING & Tree.POINTS
+    kind, sizes, trees = "o", (4, 5, 7), Tree.FLOATING & Tree.POINTS
 
     back: int
     rows: list[Any]
     products: list[tuple[Any, Any, float]]
     enclosure: EnclosureRecord | None = None
+    turns: Floats | None = None
 
     @classmethod
     def of(cls, entries: list[Any], limits: Limits) -> OnlyReference:
         """Numbers that fit the problem."""
         back, rows, products, *enclosure = entries
-        if enclosure and limits.in_space:
+        turns = None
+        if limits.in_space and len(enclosure) == 1:
+            turns = numbers_from(enclosure.pop(), limits.components - limits.p)
+        if len(enclosure) not in ((0,) if limits.in_space else (0, 3)):
             raise RecordError(cls.unfit.format(len(entries) + 1, 4))
         if type(back) is not int or not 0 < back <= len(limits.declared):
             raise RecordError("its form is not declared")
         if not all(isinstance(value, list) for value in (rows, products)):
             raise RecordError("its rows are not a list")
+        if turns is not None and (rows or products):
+            raise RecordError("it has rows beside theta")
         if not all(isinstance(product, list) and len(product) == 3 for product in products):
             raise RecordError("its products are not pairs of rows with a factor")
         factors = numbers_from([factor for *_, factor in products], len(products)).tolist()
         pairs = [tuple(cls._row(row, limits) for row in pair) for *pair, _ in products]
         said = [(one, other, factor) for (one, other), factor in zip(pairs, factors, strict=True)]
         equations = [cls._row(row, limits) for row in rows]
-        return cls(back, equations, said, EnclosureRecord(*enclosure) if enclosure else None)
+        return cls(back, equations, said, EnclosureRecord(*enclosure) if enclosure else None, turns)
 
     @staticmethod
     def _row(row: object, limits: Limits) -> Any:
@@ -464,13 +472,16 @@ class OnlyReference(ClosingRecord):
     def holds(self, known: Reference | LeafReference, codes: Codes, reach: Floats) -> bool:
         """True if no other root lies below the assignment than that of a form, a Reference or LeafReference.
 
-        ``reach``: within these bounds of the rigid displacement (theory, section 14.11).
+        ``reach``: within these bounds of the rigid displacement (theory, sections 14.11 and 14.15).
         """
+        if self.turns is not None:
+            return cast("LeafReference", known).is_sole(self.turns, reach)
         return known.is_only_root(codes, self.rows, self.products, reach)
 
     def entries(self) -> Iterable[Any]:
-        """Without an enclosure where there is none."""
-        return self.back, self.rows, [list(product) for product in self.products], *(self.enclosure or ())
+        """Without an enclosure, and theta, where there is none."""
+        turns = () if self.turns is None else (self.turns,)
+        return self.back, self.rows, [list(product) for product in self.products], *(self.enclosure or ()), *turns
 
 
 # -- trees -------------------------------------------------------------------------------------------------------------

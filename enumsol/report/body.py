@@ -202,7 +202,7 @@ def surroundings(
     for kind in np.unique(across[(fixed > 0) & drawn].round(6), axis=0):
         alike = np.flatnonzero((fixed > 0) & drawn & np.all(across.round(6) == kind, axis=1))
         held += [[int(new[k]), *short_list(across[k])] for k, _ in signs(shape.points, alike, edges)]
-    sprung: Any = [] if scene is None else acting_nodes(scene.springs.diagonal().reshape(count, d))
+    sprung: Any = [] if scene is None else acting_nodes(scene.springs.diagonal()[: count * d].reshape(count, d))
     sprung = np.array([node for node in sprung if drawn[node]], dtype=int)
     springs = [int(new[node]) for node, _ in signs(shape.points, sprung, edges)]
     return {"load": short_list(load), "summed": summed, "held": held, "springs": springs}

@@ -186,8 +186,11 @@ _POWERS = {
     **dict.fromkeys(("young", "load", "load_slope", "pressure", "pressure_slope"), (1, -2)),
     **dict.fromkeys(("spring", "body_force", "body_force_slope"), (1, -3)),
     **dict.fromkeys(("force", "force_slope"), (1, 0)),
+    **dict.fromkeys(("moment", "moment_slope"), (1, 1)),
+    "node_spring": (1, -1),
     **dict.fromkeys(
-        ("thickness", "displacement", "displacement_slope", "gap", "obstacle", "max_rigid_displacement"), (0, 1)
+        ("thickness", "displacement", "displacement_slope", "reference", "gap", "obstacle", "max_rigid_displacement"),
+        (0, 1),
     ),
 }
 #: Options that mean nothing in 3D.
@@ -200,7 +203,7 @@ def unit_text(units: tuple[str, str] | None, force: int, length: int) -> str:
     if units is None:
         return ""
     if length > 0:
-        return units[1] + _RAISED[length]
+        return f"{units[0]} {units[1]}" if force else units[1] + _RAISED[length]
     return units[0] if length == 0 else f"{units[0]}/{units[1]}{_RAISED[-length]}"
 
 

@@ -8,19 +8,19 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from enumsol.arithmetic.balls import Ball, hull
 from enumsol.errors import InvalidArgumentError, TooLargeError
 from enumsol.model.statuses import ContactStatus
 from enumsol.roots.stability import Equilibria, displacement
 from enumsol.support.array_arguments import real_array, vector_of
 from enumsol.support.immutable import Sealed
-from enumsol.trusted.motions_of_body import BodyMotions, friction_over, reciprocal
+from enumsol.trusted.motions_of_body import BodyMotions, friction_changes, friction_over
 from enumsol.trusted.running_away import Behaviour, positive, rates_in
 from enumsol.trusted.status_rows import OPEN, SLIP_MINUS, SLIP_PLUS, STICK
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
+    from enumsol.arithmetic.balls import Ball
     from enumsol.model.problem3d import AnyProblem
     from enumsol.roots.root import Root
     from enumsol.support.array_types import ArrayLike, Floats
@@ -148,7 +148,11 @@ def rates(problem: AnyProblem, root: Root, load_rate: ArrayLike, friction_rate: 
                 "a contact node touches without force at root, in 3D, where it may begin to slip in any direction; "
                 "expected none that does"
             )
-        found = _of_part(setting, load[setting.dofs], _weakened(asked, root, setting, change))
+        more = None
+        if np.any(change[setting.limits]):
+            assert root.enclosure is not None
+            more = friction_changes(setting, F, change, root.enclosure.lambda_t.reshape(problem.p, -1, 2))
+        found = _of_part(setting, load[setting.dofs], more)
         if isinstance(found, str):
             return Rates((), complete=False, reason=found)
         parts.append([(setting, way, y) for way, y in found])
@@ -166,26 +170,6 @@ def _friction_rate(problem: AnyProblem, given: ArrayLike) -> Floats:
             f"friction_rate has shape {rate.shape}; expected a number or shape ({problem.p},){more}"
         )
     return np.broadcast_to(rate.reshape(problem.p, -1) if rate.ndim else rate, (problem.p, axes))
-
-
-def _weakened(asked: Equilibria, root: Root, setting: Setting, change: Floats) -> Ball | None:
-    """Rates that a change of friction adds to r of the nodes at their limit, (l,); None where it does not change."""
-    if not np.any(change[setting.limits]):
-        return None
-    assert root.enclosure is not None
-    p, place = asked.problem.p, {row: at for at, row in enumerate(setting.rows)}
-    forces = root.enclosure.lambda_t.reshape(p, -1, 2)
-    found = []
-    for k, i in enumerate(setting.limits):
-        # r is F' times y_n - d'(y_t / F), F' the larger coefficient, and R has F' d / F
-        total = Ball.exact(np.zeros(1))
-        for axis, F in enumerate(friction_over(asked.problem, root.alpha, root.alpha)):
-            if (row := place.get((axis + 1) * p + i)) is not None:
-                force = hull([Ball.exact(end) for end in forces[i, axis]])
-                share = setting.motions.moves[row, k : k + 1] * force * reciprocal(F[i])
-                total = total + share * Ball.exact(change[i, axis : axis + 1])
-        found.append(total)
-    return Ball.joined(*found)
 
 
 def _of_part(setting: Setting, load: Floats, more: Ball | None) -> list[tuple[Behaviour, Ball]] | str:

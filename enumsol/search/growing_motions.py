@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import itertools
 from functools import partial
-from typing import TYPE_CHECKING, Any, cast
+from typing import TYPE_CHECKING, Any
+from weakref import WeakKeyDictionary
 
 import numpy as np
 import scipy.linalg
@@ -239,9 +240,9 @@ class Spectrum:
         """None of a large body, or where the eigenvalues are not found."""
         if stiffness.A.shape[0] > _SPECTRUM:
             return None
-        if stiffness.spectrum is None:
-            stiffness.spectrum = cls._found(stiffness)
-        return cast("Spectrum", stiffness.spectrum)
+        if stiffness not in _SPECTRA:
+            _SPECTRA[stiffness] = cls._found(stiffness)
+        return _SPECTRA[stiffness]
 
     @classmethod
     def _found(cls, stiffness: DynamicStiffness) -> Spectrum | None:
@@ -260,6 +261,10 @@ class Spectrum:
             return Ball.exact(np.asarray(np.linalg.inv((self._rows / weights) @ self._rows.T), dtype=np.float64))
         except np.linalg.LinAlgError:
             return None
+
+
+#: One for each stiffness, as long as there is that.
+_SPECTRA: WeakKeyDictionary[DynamicStiffness, Spectrum | None] = WeakKeyDictionary()
 
 
 def _push(L: Floats) -> Floats | None:

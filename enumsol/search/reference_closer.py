@@ -36,10 +36,14 @@ _NOTHING = 1e-9
 
 
 class OnlyRoot(NamedTuple):
-    """Why no other root lies below an assignment: rows that are equations, and products of rows."""
+    """Why no other root lies below an assignment: rows that are equations, and products of rows.
+
+    ``turns``: in 3D theta with which no other root is left at all.
+    """
 
     rows: list[Any]
     products: list[tuple[Any, Any, float]]
+    turns: Floats | None = None
 
 
 class Referring(Protocol):

@@ -237,7 +237,7 @@ def _check_sums(entries: Floats, row: NDArray[Any], column: NDArray[Any], name: 
 
 
 def short_vector(value: object, name: str, size: int) -> Floats:
-    """Value as a finite array of shape (2,) or (3,).
+    """Value as a finite array of shape (1,), (2,), (3,) or (6,).
 
     Raises
     ------
@@ -249,8 +249,9 @@ def short_vector(value: object, name: str, size: int) -> Floats:
     except InvalidArgumentError:
         array = np.empty(0)
     if array.shape != (size,):
-        expected = {2: "two", 3: "three"}[size]
-        raise InvalidArgumentError(f"{name} is {shown(value)}; expected {expected} finite numbers")
+        expected = {1: "one", 2: "two", 3: "three", 6: "six"}[size]
+        numbers = "number" if size == 1 else "numbers"
+        raise InvalidArgumentError(f"{name} is {shown(value)}; expected {expected} finite {numbers}")
     return array
 
 

@@ -240,6 +240,32 @@ def friction_over(problem: AnyProblem, low: AlphaLike, high: AlphaLike) -> list[
     return balls
 
 
+def friction_changes(setting: Setting, F: list[Ball], rates: Floats, forces: Floats) -> Ball:
+    """Rates that changes of F add to r of the nodes at their limit of a part, (l,) (theory, section 15.5).
+
+    Parameters
+    ----------
+    F : list of Balls (p,)
+        Coefficients by axis.
+    rates : (p, 1) or (p, 2) array
+        Their derivatives.
+    forces : (p, 1, 2) or (p, 2, 2) array
+        Bounds of lambda_t.
+    """
+    p, place = len(forces), {row: at for at, row in enumerate(setting.rows)}
+    found = []
+    for k, i in enumerate(setting.limits):
+        # r is F' times y_n - d'(y_t / F), F' the larger coefficient, and R has F' d / F
+        total = Ball.exact(np.zeros(1))
+        for axis, own in enumerate(F):
+            if (row := place.get((axis + 1) * p + i)) is not None:
+                force = hull([Ball.exact(end) for end in forces[i, axis]])
+                share = setting.motions.moves[row, k : k + 1] * force * reciprocal(own[i])
+                total = total + share * Ball.exact(rates[i, axis : axis + 1])
+        found.append(total)
+    return Ball.joined(*found)
+
+
 def _kind(held: Collection[int], friction: bool) -> str:
     """The kind of a node: stay open or stuck, slide at its limit, or leave where it touches without force."""
     codes = set(held)

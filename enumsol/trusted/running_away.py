@@ -15,8 +15,19 @@ from functools import cached_property
 from typing import TYPE_CHECKING, Protocol
 
 import numpy as np
+import scipy.sparse as sp
 
-from enumsol.arithmetic.balls import TINY, UNIT, Ball, dense_eigenvalue_bound, determinant_sign, solution, upper_norm
+from enumsol.arithmetic.balls import (
+    SAFE,
+    TINY,
+    UNIT,
+    Ball,
+    dense_eigenvalue_bound,
+    determinant_sign,
+    gamma,
+    solution,
+    upper_norm,
+)
 from enumsol.trusted.status_rows import OPEN, SLIP_MINUS, SLIP_PLUS, STICK
 
 if TYPE_CHECKING:
@@ -28,6 +39,8 @@ if TYPE_CHECKING:
 
 #: Ways in which nodes slide or stay that are looked at for one range of mu: a file could ask for any number of them.
 MOST_WAYS = 20_000
+#: Rows up to which products are those of dense matrices, which takes less time there.
+_SMALL = 64
 
 
 class Stiffness(Protocol):
@@ -138,7 +151,9 @@ class NoMotion:
         kept = np.setdiff1d(np.arange(len(motions.signed)), self.stays)
         if not len(kept):
             return True
-        left, right = motions.leaning @ Ball.exact(self.weights[:, kept]), motions.moves[:, kept]
+        plain = np.array_equal(self.weights, np.eye(len(motions.signed)))
+        left = motions.leaning[:, kept] if plain else motions.leaning @ Ball.exact(self.weights[:, kept])
+        right = motions.moves[:, kept]
         apart = left - right
         for K, bend, N in zip((first, last), (first_bend, last_bend), self.products, strict=True):
             Q = _across(left, K, right).symmetric - Ball.exact(N[np.ix_(kept, kept)]).symmetric
@@ -470,8 +485,19 @@ def _null_vector(M: Ball) -> Ball | None:
 
 
 def _across(left: Ball, K: Ball, right: Ball) -> Ball:
-    """left' K right."""
-    return left.T @ (K @ right)
+    """left' K right; most entries of ``left`` and ``right`` are zero."""
+    return _times(_times(K, right).T, left).T
+
+
+def _times(K: Ball, right: Ball) -> Ball:
+    """K times a matrix; a large one is sparse, with at most as many terms in a sum as K has columns."""
+    if K.mid.shape[-1] <= _SMALL:
+        return K @ right
+    middle, spread = sp.csc_array(right.mid), sp.csc_array(right.rad)
+    k = gamma(K.mid.shape[-1] + 4)
+    size, both = np.abs(K.mid), abs(middle) + spread
+    rad = K.rad @ both + size @ spread + k * (size @ abs(middle))
+    return Ball(np.asarray(K.mid @ middle), np.asarray(rad * (1.0 + k) * SAFE + TINY))
 
 
 def _ratio(above: Fraction | int, below: Fraction) -> Ball:

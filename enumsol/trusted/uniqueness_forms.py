@@ -103,6 +103,13 @@ class Multipliers:
             price[has] = price[has] + self.push[has, k] * y[t]
         return price
 
+    def turned(self, y: Ball) -> Ball:
+        """kappa (lambda_t - turn lambda_n) at the places of lambda_t, (m,); 0 at lambda_n."""
+        turned = Ball.exact(np.zeros(len(y.mid)))
+        for k, has, t in self._tangents():
+            turned[t] = (y[t] - self.turn[has, k] * y[has]) * Ball.exact(self.kappa[has])
+        return turned
+
     def cross(self, G: Ball, share: float) -> Ball:
         """C = -G (D - c), (r, m), without radius where nothing is left of it."""
         C, p = Ball.exact(np.zeros(G.shape)), len(self.mu)
@@ -170,7 +177,7 @@ def _smallest(S: Ball, numbers: Multipliers, off: Floats, lost: Floats, held: Ba
     if not len(S.mid):
         return 1.0
     Q = numbers.form(S) - numbers.taken(S, off, lost)
-    return _least((Q if held is None else Q + held.T @ held).symmetric)
+    return least_eigenvalue((Q if held is None else Q + held.T @ held).symmetric)
 
 
 @dataclass(frozen=True)
@@ -251,7 +258,7 @@ class RootForm:
         S, G = body
         weighted = G * Ball.exact(np.array(np.sqrt(balance)))
         Q = (form + weighted.T @ weighted).symmetric
-        smallest = _least(Q)
+        smallest = least_eigenvalue(Q)
         if not smallest > 0:
             return None
         # m |d|^2 is left out of what is factorized
@@ -315,18 +322,33 @@ class RootForm:
     def _costs(self, equations: Ball, lacking: float, reach: Floats) -> bool:
         """True if gaps of loaded nodes cost more than the form lacks (theory, (14.17))."""
         loaded = np.flatnonzero(self.cost > 0)
-        rows = Ball.joined(Ball.exact(np.diag(self.cost)[loaded]), equations)
-        moved = rows @ self.G.T
-        square = _least((moved.T @ moved).symmetric)
-        if not square > 0:
+        steep, pushed = self._slopes(Ball.joined(Ball.exact(np.diag(self.cost)[loaded]), equations))
+        if not steep > 0:
             return False
         if lacking == 0:
             return True
-        steep = float(np.sqrt(square)) / SAFE
-        pushed = float(upper_norm(_sizes(rows @ self.S)))
         most = float(upper_norm(2.0 * reach * SAFE))
         within = 2.0 * lacking * most * SAFE < steep
         return bool(within and lacking * (2.0 * pushed / steep) ** 2 * SAFE * SAFE < self.least)
+
+    def _slopes(self, rows: Ball) -> tuple[float, float]:
+        """gamma, or 0, and Gamma of theory, Theorem 14.11: rows (w - w*) are at least gamma |e| - Gamma |d|."""
+        moved = rows @ self.G.T
+        square = least_eigenvalue((moved.T @ moved).symmetric)
+        return float(np.sqrt(max(square, 0.0))) / SAFE, float(upper_norm(_sizes(rows @ self.S)))
+
+    def is_sole(self, cost: Floats, least: float, left: float, farthest: float) -> bool:
+        """True if no other root has |d| within ``farthest``, where changes of w cost so much (theory, (14.23)).
+
+        Parameters
+        ----------
+        cost : (m,) array, not negative
+        least, left : as of a Confinement
+        farthest : float
+        """
+        steep, pushed = self._slopes(Ball.exact(np.diag(cost)[cost > 0]))
+        near = left * 2.0 * pushed * SAFE * SAFE < steep * least
+        return bool(steep > 0 and near and 2.0 * left * farthest * SAFE * SAFE < steep)
 
 
 @dataclass(frozen=True)
@@ -420,7 +442,7 @@ def _sizes(rows: Ball) -> Floats:
     return np.where(_used(rows), upper_norm(rows.size, axis=1), 0.0) if len(rows.mid) else np.zeros(0)
 
 
-def _least(M: Ball) -> float:
+def least_eigenvalue(M: Ball) -> float:
     """Lower bound of the smallest eigenvalue of symmetric matrices; at most 0 where none positive is proven."""
     return (dense_eigenvalue_bound(M.mid) - float(upper_norm(M.rad))) / SAFE if M.finite else 0.0
 
@@ -429,12 +451,12 @@ def _lacks(M: Ball) -> float:
     """A number t, negative if possible, with M + t at least 0; infinite where none was found."""
     if not len(M.mid):
         return 0.0
-    least = _least(M)
+    least = least_eigenvalue(M)
     if least > 0:
         return -least
     lacking = 2.0 * float(upper_norm(M.rad)) + _LACKING * float(np.max(np.abs(M.mid))) + TINY
     for _ in range(_TRIES if np.isfinite(lacking) else 0):
-        if _least(M + Ball.exact(lacking * np.eye(len(M.mid)))) > 0:
+        if least_eigenvalue(M + Ball.exact(lacking * np.eye(len(M.mid)))) > 0:
             return lacking
         lacking *= _MORE
     return np.inf

@@ -8,10 +8,11 @@ from fractions import Fraction
 
 import numpy as np
 import pytest
+from flint import fmpq, fmpq_mat
 from numpy.lib.stride_tricks import as_strided
 
 from enumsol.arithmetic import balls
-from enumsol.arithmetic.balls import Ball
+from enumsol.arithmetic.balls import Ball, Inverse
 
 
 @pytest.fixture(scope="module")
@@ -249,3 +250,21 @@ def test_balls_are_kept_as_they_are(kind):
         again = pickle.loads(pickle.dumps(ball))
         assert type(again) is Ball
         assert_same_balls(again, ball)
+
+
+@pytest.mark.parametrize("size", [1, 3, 12])
+def test_the_inverse_of_a_matrix_in_a_ball(size):
+    """All inverses are in the ball, and it is hardly wider than that of a system with the unit matrix."""
+    rng = np.random.default_rng(size)
+    mid = rng.normal(size=(size, size)) + 3 * np.eye(size)
+    rad = 1e-9 * rng.random((size, size))
+    inverse = Inverse.of(Ball(mid, rad))
+    found, solved = inverse.whole(), inverse.solve(Ball.exact(np.eye(size)))
+    assert np.all(found.rad <= 1.1 * solved.rad + 1e-14)
+    for _ in range(20):
+        corner = mid + rad * rng.choice([-1, 1], size=rad.shape)
+        exact = fmpq_mat([[fmpq(*x.as_integer_ratio()) for x in row] for row in corner.tolist()])
+        parts = (exact.inv().entries(), found.mid.ravel().tolist(), found.rad.ravel().tolist())
+        for value, m, r in zip(*parts, strict=True):
+            # a corner that was rounded may lie outside by its rounding
+            assert abs(value - fmpq(*m.as_integer_ratio())) <= fmpq(*r.as_integer_ratio()) * (1 + fmpq(1, 10**6))

@@ -28,7 +28,7 @@ IN_SPACE = {
     *("enumsol.checker.space_checker", "enumsol.condensation.space_condensed", "enumsol.model.sectors"),
     *inside("trusted.space", "resultants", "sector_margins", "sector_rows", "leaves", "boxed_solution"),
     *inside("trusted.space", "natural_map", "krawczyk", "space_uniqueness", "turning"),
-    *inside("trusted.space", "leaf_conditions", "leaf_equations"),
+    *inside("trusted.space", "leaf_conditions", "leaf_equations", "confinement"),
 }
 #: The search: its rooms, and what it alone uses of rooms that it shares with the checkers.
 SEARCH = (
@@ -69,7 +69,15 @@ SHARED = {
     "trusted.at_alpha": {"VerifiedSelection", "settled_selection", "solve_selection"},
     "trusted.precise_at_alpha": {"PreciseAtAlpha"},
     "trusted.motions_of_body": {
-        *("BodyMotions", "Setting", "direction", "friction_directions", "friction_over", "reciprocal"),
+        *(
+            "BodyMotions",
+            "Setting",
+            "direction",
+            "friction_changes",
+            "friction_directions",
+            "friction_over",
+            "reciprocal",
+        ),
     },
     "trusted.running_away": None,
     "trusted.quadratic_forms": {"EnclosedForm", "Equations", "QuadraticForm"},

@@ -9,6 +9,7 @@ import pytest
 from command_line import assert_refused, printed, run
 
 import enumsol
+from enumsol import gallery
 from enumsol.cli import graph as command
 
 GRAPH = ("graph", "gallery:one-node-6.1", "--from", 0, "--to", 3)
@@ -32,10 +33,24 @@ def test_it_is_left_out_if_that_is_asked_for(capsys):
 @pytest.mark.parametrize(("share", "shown"), [(1e9, True), (0.0, False)])
 def test_without_being_asked_only_where_it_is_cheap(capsys, monkeypatch, share, shown):
     monkeypatch.setattr(command, "_SHARE", share)
-    note = None if shown else "more than a tenth of the time of the graph; --stability finds it"
+    note = None if shown else "more than a tenth of the work on the graph; --stability finds it"
     assert ("stability" in printed(capsys, *GRAPH, note=note)) is shown
     if not shown:
         assert run(capsys, *GRAPH, "--quiet")[2] == ""
+
+
+def test_work_is_counted(tmp_path):
+    """Arcs on which a node slides, where friction is constant once each, on any machine."""
+    varying, constant = (
+        gallery.one_node_triangle(),
+        gallery.one_node_triangle().replace(friction=1.0, friction_slope=0.0),
+    )
+    constant = constant.replace(load_slope=[0.5, 0.1])
+    for problem, each in ((varying, 5000), (constant, 300)):
+        found = enumsol.branch_graph(problem, (0, 3))
+        sliding = [arc.statuses for arc in found.arcs if "slip" in str(arc.statuses[0].value)]
+        assert command._work(problem, found) == each * len(set(sliding))
+        assert sliding
 
 
 def test_without_a_mass_nothing_is_said_or_it_is_refused(capsys, tmp_path):

@@ -64,7 +64,7 @@ def test_included_files(tmp_path):
 def test_places_of_included_lines(tmp_path):
     files = {"sets.inc": "** c\n*NSET, NSET=A\n1, B\n"}
     bad_argument(
-        "^sets.inc line 3: there is no set of nodes named B",
+        "^sets.inc line 3: there is no set of nodes named 'B'",
         read,
         tmp_path,
         f"*INCLUDE,INPUT=sets.inc\n{SQUARE}",

@@ -94,7 +94,7 @@ def test_surfaces_are_facets_of_the_body(tmp_path):
     assert found["all sides"] == sorted(row for rows in parts(box).values() for row in rows)
     assert mesh.nodes("points").tolist() == [0, 1]
     clash = "*NSET,NSET=Points\n12\n*SURFACE,NAME=points,TYPE=NODE\n10,\n"
-    bad_argument("line 91: the surface Points has other nodes than the set Points", mesh_of, tmp_path, text + clash)
+    bad_argument("line 91: the surface POINTS has other nodes than the set POINTS", mesh_of, tmp_path, text + clash)
 
 
 def test_spelled_names_and_instances(tmp_path):

@@ -63,8 +63,8 @@ def test_members_that_do_not_exist_are_named(tmp_path):
 REFUSED = [
     ("*NSET\n1\n", "line 21: .NSET has no NSET; expected NSET=NAME"),
     ("*ELSET,ELSET=\n1\n", "line 21: .ELSET has no ELSET"),
-    ("*NSET,NSET=A\nB\n", "line 22: there is no set of nodes named B; expected .NSET, NSET=B"),
-    ("*ELSET,ELSET=A\n10,\nB\n", "line 23: there is no set of elements named B"),
+    ("*NSET,NSET=A\nB\n", "line 22: there is no set of nodes named 'B'; expected one of A"),
+    ("*ELSET,ELSET=A\n10,\nB\n", "line 23: there is no set of elements named 'B'"),
     ("*NSET,NSET=A\nB\n*NSET,NSET=B\nA\n", "the set A contains itself"),
     ("*ELSET,ELSET=A\nA\n", "line 21: the set A contains itself"),
     ("*NSET,NSET=A,GENERATE\n5,1\n", "line 22: .NSET goes from 5 to 1 by 1; expected a step of at least 1"),
@@ -94,8 +94,8 @@ REFUSED = [
         "line 21: .SURFACE is of type CUTTING SURFACE, which",
     ),
     ("*SURFACE\n10,S1\n", "line 21: .SURFACE has no NAME"),
-    ("*SURFACE,NAME=S\nB,S1\n", "line 22: there is no set of elements named B"),
-    ("*SURFACE,NAME=S,TYPE=NODE\nALL\n", "line 22: there is no set of nodes named ALL"),
+    ("*SURFACE,NAME=S\nB,S1\n", "line 22: there is no set of elements named 'B'"),
+    ("*SURFACE,NAME=S,TYPE=NODE\nALL\n", "line 22: there is no set of nodes named 'ALL'"),
 ]
 
 
@@ -164,8 +164,8 @@ def test_instances_of_parts(tmp_path):
     assert [deck.spelled[name] for name in ("HELD", "UP-2.TOP")] == ["Held", "Up-2.Top"]
     for name, rows in (("Up-1.3", [7]), ("low-1.top", [3, 4]), ("7", [0]), ("held", [1, 2, 7, 8])):
         assert deck.nodes_of(name, None).tolist() == rows
-    bad_argument("^here: node Up-1.9 is not in the deck; expected a number or a set", deck.nodes_of, "Up-1.9", "here")
-    bad_argument("^here: element 1 is not in the deck", deck.elements_of, "1", "here")
+    bad_argument("^here: node 'Up-1.9' is not in the deck; expected a number or a set", deck.nodes_of, "Up-1.9", "here")
+    bad_argument("^here: element '1' is not in the deck", deck.elements_of, "1", "here")
 
 
 @pytest.mark.parametrize(
@@ -180,7 +180,7 @@ def test_instances_of_parts(tmp_path):
         ("0., 0., 5., 90.\n", "0., 0., 5.\n", "line 35: .INSTANCE has 6 numbers in a line; expected 7"),
         ("0., 1., 0.\n", "0., 1., 0.\n0,0,0,0,0,1,5\n1,2\n", "has 3 lines of data; expected a translation and a rot"),
         ("instance=Low-1\n1, 2", "instance=Low-9\n1, 2", "the instance LOW-9 is not in the deck; expected"),
-        ("Up-2.Top, ", "Up-2.Side, ", "there is no set of nodes named Up-2.Side"),
+        ("Up-2.Top, ", "Up-2.Side, ", "there is no set of nodes named 'Up-2.Side'"),
     ],
 )  # fmt: skip
 def test_parts_and_instances_that_are_refused(tmp_path, old, new, message):

@@ -7,6 +7,7 @@ import scipy.sparse as sp
 
 import enumsol
 from enumsol import fem
+from enumsol.search.space.space_setup import SpaceSolvers
 
 #: Solutions farther away are beyond the bound of the rigid displacement.
 _FAR = 1e4
@@ -172,3 +173,30 @@ def floating_in_space(problem):
         max_rigid_displacement=problem.max_rigid_displacement,
         **data,
     )
+
+
+def body_with_reference(seed):
+    """A random body, its scaled system, and the form of a root of it if there is one."""
+    rng = np.random.default_rng([seed, 47])
+    p = int(rng.integers(1, 4))
+    most = 3 * p if p == 1 else 6
+    frictions = ((0.3, 1.0), (1.0, 3.0), (3.0, 8.0))[seed % 3]
+    problem = known_body(seed, p, int(rng.integers(1, most + 1)), frictions=frictions).problem
+    solvers = SpaceSolvers(problem, 0, "verified")
+    leaf = solvers.known_root
+    return problem, solvers.system, None if leaf is None else solvers.certifier(None).reference(leaf)
+
+
+def two_cubes(k, push=(0.1, 0.0), friction=0.3, **more):
+    """A cube of k^3 cells, held by nothing, pressed on another one and pushed at its side: six modes."""
+    low, high = fem.box(k, k, k), fem.box(k, k, k)
+    count = len(low.points)
+    facets = {"floor": low.facets["bottom"], "table": low.facets["top"]}
+    facets |= {
+        name: high.facets[side] + count for name, side in (("foot", "bottom"), ("roof", "top"), ("side", "left"))
+    }
+    points = np.concatenate([low.points, high.points + np.array([0.0, 0.0, 1.0])])
+    mesh = fem.PartedMesh(points, np.concatenate([low.cells, high.cells + count]), facets)
+    given = {"pairs": [("foot", "table")], "clamp": "floor", "pressure": {"roof": 1.0}, "load": {"side": (*push, 0.0)}}
+    more = {"max_rigid_displacement": "auto"} | more
+    return fem.mesh_problem(mesh, young=1000.0, poisson=0.3, friction=friction, **given, **more)

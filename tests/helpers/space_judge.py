@@ -178,10 +178,14 @@ class Point:
         balance = weights_of_balance(self.data, self.scale, balance)
         return RootForm(self.system, Weights(self.system, numbers), root, leaf, balance, share)
 
-    def leaf_o(self, codes, back, rows, products):
+    def leaf_o(self, codes, back, rows, products, turns=None):
         """[6.7] No other root than the one that was declared so many before."""
         need(1 <= integer(back) <= len(self.declared), "no root is declared")
         form, (length, force) = self.declared[-back], self.scale
+        if turns is not None:
+            need(rows == products == [], "there are rows beside theta")
+            form.sole(floats(turns, self.system.m - self.p))
+            return
         need(isinstance(rows, list) and isinstance(products, list), "no lists of rows and products")
         places, factors = [], []
         for *pair, z in products:

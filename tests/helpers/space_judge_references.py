@@ -90,6 +90,63 @@ class RootForm:
             need(is_definite(_raised(M, lacking)), "the form is not definite on the equations")
         self.costs(equations, lacking)
 
+    def sole(self, turns):
+        """No other root at all, by theory, section 14.15."""
+        system, y, w, m = self.system, self.root.y, self.root.w, self.system.m
+        theta = [[turns[place - len(system.tau)] for place in places] for places in system.tau]
+        need(all(length_of(own) <= 1 + _TINY for own in theta), "theta is too long")
+        D, a, V = arb_mat(_unit(m)), [arb(0)] * m, [arb(0)] * m
+        for i, places in enumerate(system.tau):
+            for place, value in zip(places, theta[i], strict=True):
+                D[place, i], a[place], V[place] = -value, y[place] - value * y[i], w[place]
+        Q = D.transpose() * system.S
+        Q = (Q + Q.transpose()) / arb(2)
+        heavy = _HEAVY * max(abs(x).upper() for x in Q.entries())
+        P = sum((square(row) * (heavy / max(abs(x).upper() for x in row) ** 2) for row in self.G.tolist()), Q)
+        need(is_definite(P), "the form is not definite")
+        R, G, inverse = self.G * D, self.G, P.inv()
+        R = R - R * G.transpose() * (G * G.transpose()).inv() * G
+        a, V = arb_mat([[x] for x in a]), arb_mat([[x] for x in V])
+        b = system.S * a - D.transpose() * V
+        centre = inverse * b * arb(-0.5)
+        rest = (a.transpose() * V)[0, 0] - (b.transpose() * centre)[0, 0] / 2
+        slope, moved = arb(0), R * centre + G * a
+        for j, row in enumerate(R.tolist()):
+            across = (arb_mat([row]) * inverse * arb_mat([[x] for x in row]))[0, 0]
+            rest += 2 * self.rho[j] * abs(moved[j, 0])
+            slope += 2 * self.rho[j] * arb(abs(across).upper()).sqrt()
+        radius = (slope + arb((slope * slope + 4 * rest.max(arb(0))).upper()).sqrt()) / 2
+        self.costs_at_most(R, radius, (centre, inverse), theta)
+
+    def costs_at_most(self, R, radius, ellipsoid, theta):
+        """What theory, (14.22) and (14.23), ask for."""
+        (centre, inverse), y, w, rows = ellipsoid, self.root.y, self.root.w, []
+        for i, places in enumerate(self.system.tau):
+            v = [w[place] for place in places]
+            if self.leaf[i] == 0:
+                along = sum((x * z for x, z in zip(theta[i], v, strict=True)), arb(0))
+                need(not places or abs(w[i]) + along >= length_of(v), "theta does not serve a gap")
+                continue
+            need(not places or self.leaf[i] == 1, "a node slides")
+            costs, away = [(i, y[i])], radius * inverse[i, i].sqrt()
+            if places:
+                ends = [centre[i, 0] + sign * away for sign in (-1, 1)]
+                held = [
+                    y[i] + d - length_of([y[place] + z * d for place, z in zip(places, theta[i], strict=True)])
+                    for d in ends
+                ]
+                need(all(c > 0 for c in held), "a node may slide")
+                costs += [(place, min(c.lower() for c in held)) for place in places]
+            rows += [[arb(c) if k == place else arb(0) for k in range(self.system.m)] for place, c in costs]
+        moved = self.moved(rows)
+        square_of = moved.transpose() * moved
+        need(is_definite(square_of), "some rigid displacement costs nothing")
+        gamma, size = (1 / square_of.inv().trace()).sqrt(), length_of(R.entries())
+        pushed, m = length_of((arb_mat(rows) * self.system.S).entries()), 1 / inverse.trace()
+        need(2 * size * pushed < gamma * m, "rigid displacements cost too little")
+        far = length_of(centre.entries()) + radius * inverse.trace().sqrt()
+        need(2 * size * far < gamma, "forces may be too different")
+
     def moved(self, rows):
         return arb_mat(rows) * self.G.transpose() if rows else arb_mat(0, self.r)
 
@@ -137,6 +194,10 @@ class RootForm:
         pushed = length_of((H * self.system.S).entries())
         need(lacking * (2 * pushed / gamma) ** 2 < self.least, "rigid displacements cost too little")
         need(4 * lacking * length_of(self.rho) < gamma, "rigid displacements may be too large")
+
+
+def _unit(size):
+    return [[arb(i == j) for j in range(size)] for i in range(size)]
 
 
 def _raised(M, by):

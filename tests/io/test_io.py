@@ -316,7 +316,10 @@ BAD_ARRAYS_3D = [
     (DENSE_3D | MESH | {"mesh_motion": np.eye(6)}, "mesh_dofs is given together with mesh_motion"),
     (DENSE_3D | MESH | {"mesh_cells": [[0, 1, 2, 3]]}, r"mesh_cells holds other numbers than 0 \.\. 1"),
     (DENSE_3D | MESH | {"mesh_cells": [[0, 1, 0, 0.5]]}, "mesh_cells holds other numbers than"),
-    (DENSE_3D | MESH | {"mesh_cells": [[0, 1]]}, r"mesh_cells has shape \(1, 2\); expected \(k, m\) with m among 4, 6, 8"),
+    (
+        DENSE_3D | MESH | {"mesh_cells": [[0, 1]]},
+        r"mesh_cells has shape \(1, 2\); expected \(k, m\) with m among 4, 6, 8",
+    ),
     (DENSE_3D | MESH | {"mesh_dofs": [0, 1, 2, 3, 4, 4]}, "repeats a number"),
     (DENSE_3D | {"mesh_rows": [0, 1]}, "mesh_points, mesh_cells, mesh_motion is missing .found mesh_rows"),
     (DENSE_3D | MESH | {"mesh_facets": [[0, 1]]}, r"mesh_facets has shape \(1, 2\); expected \(k, m\) with m"),

@@ -190,7 +190,8 @@ CALLS = [
         fem.mesh_problem,
         {"mesh": fem.rectangle(2, 1).parted(), "young": 2.5, "poisson": 0.25, **BOTTOM, "pressure": {"left": 1}},
         "mesh young poisson contact plane friction friction_slope friction2 friction2_slope axis clamp symmetry "
-        "displacement displacement_slope spring load load_slope pressure pressure_slope body_force "
+        "displacement displacement_slope transform tie reference rigid coupling equations node_spring moment "
+        "moment_slope spring load load_slope pressure pressure_slope body_force "
         "body_force_slope force force_slope gap obstacle",
     ),
     (fem.read_mesh_problem, {}, "path"),

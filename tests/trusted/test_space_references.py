@@ -8,26 +8,12 @@ from collections import Counter
 import numpy as np
 import pytest
 from effort import some
-from floating_space import known_body, newton_solutions
+from floating_space import body_with_reference, newton_solutions
 
 from enumsol.model.sectors import SECTORS, direction, end_number
 from enumsol.model.statuses import CONTACT, OPEN, STICK, UNDECIDED
 from enumsol.search.space.space_references import proposed
-from enumsol.search.space.space_setup import SpaceSolvers
 from enumsol.trusted.space.sector_rows import GAP, LEFT, RIGHT
-
-FRICTIONS = ((0.3, 1.0), (1.0, 3.0), (3.0, 8.0))
-
-
-def body(seed):
-    """A random body, and the form of a root of it if there is one."""
-    rng = np.random.default_rng([seed, 47])
-    p = int(rng.integers(1, 4))
-    most = 3 * p if p == 1 else 6
-    problem = known_body(seed, p, int(rng.integers(1, most + 1)), frictions=FRICTIONS[seed % 3]).problem
-    solvers = SpaceSolvers(problem, 0, "verified")
-    leaf = solvers.known_root
-    return problem, solvers.system.force, None if leaf is None else solvers.certifier(None).reference(leaf)
 
 
 def assignments(rng, solution, count):
@@ -54,10 +40,10 @@ def is_in(sector, v):
 
 def told(seed):
     """What was tried of one body, and that nothing was said that is wrong."""
-    problem, force, reference = body(seed)
+    problem, system, reference = body_with_reference(seed)
     if reference is None:
         return Counter(without=1)
-    root = reference.root.y.mid[: problem.p] * force
+    root = reference.root.y.mid[: problem.p] * system.force
     solutions = newton_solutions(problem, 15, seed)
     others = [s for s in solutions if np.max(np.abs(s[1] - root)) > 1e-6 * (1 + np.max(root))]
     rng, counts = np.random.default_rng(seed), Counter(bodies=1, several=bool(others))

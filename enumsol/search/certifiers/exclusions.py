@@ -161,7 +161,7 @@ class Exclusions:
     def only_root(self, codes: Codes, reference: Reference, proposal: OnlyRoot, *, within: bool) -> bool | None:
         """True if the bound is needed for no other root to lie below an assignment; None if that is not proven."""
         for system in (self.free, self.system)[: 2 if within else 1]:
-            if OnlyReference(0, *proposal).holds(reference, codes, system.reach):
+            if OnlyReference(0, proposal.rows, proposal.products).holds(reference, codes, system.reach):
                 return system is self.system
         return None
 

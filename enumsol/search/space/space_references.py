@@ -14,6 +14,7 @@ from scipy.optimize import nnls
 from enumsol.model.sectors import SECTORS
 from enumsol.model.statuses import OPEN, SLIP_MINUS, SLIP_PLUS, STICK
 from enumsol.search.reference_closer import OnlyRoot, ReferenceCloser
+from enumsol.search.space.sole_roots import sole_turns
 from enumsol.search.space.space_fathoming import DefiniteForm
 from enumsol.trusted.space.sector_rows import ALONG, GAP, LEFT, RIGHT, SLIP
 
@@ -45,10 +46,14 @@ def space_closer(certifier: Any, engine: SpaceEngine, root: Callable[[], Codes |
         Of the relaxations, which decides first whether some nodes are open.
     root : callable giving the codes of a leaf with a strict root, or None
     """
+    sole: Floats | None = None
 
     def worth(found: LeafReference) -> bool:
-        if not found.is_only_root(found.selection, *proposed(found, found.selection), found.system.reach):
+        nonlocal sole
+        own = proposed(found, found.selection)
+        if not found.is_only_root(found.selection, own.rows, own.products, found.system.reach):
             return False
+        sole = sole_turns(found)
         engine.first = _far_apart(found)
         return True
 
@@ -57,7 +62,11 @@ def space_closer(certifier: Any, engine: SpaceEngine, root: Callable[[], Codes |
         return min(vain // 16, 7)
 
     easy = 0 if engine.system.p >= _MANY else _EASY
-    return ReferenceCloser(certifier, root, proposed, worth=worth, pause=pause, easy=easy)
+
+    def whole_or_below(found: LeafReference, codes: Codes) -> OnlyRoot:
+        return proposed(found, codes) if sole is None else OnlyRoot([], [], sole)
+
+    return ReferenceCloser(certifier, root, whole_or_below, worth=worth, pause=pause, easy=easy)
 
 
 def _far_apart(reference: LeafReference) -> list[int]:

@@ -337,7 +337,7 @@ class SpaceCertifier(Certifier):
     def only_root(self, codes: Codes, reference: LeafReference, proposal: OnlyRoot) -> list[SpaceRoot] | None:
         """The root, as a list, unless it was declared before; None if it is not proven that no other one lies below."""
         exclusions, leaf, found = self._exclusions, reference.selection, list[SpaceRoot]()
-        record = OnlyReference(0, *proposal)
+        record = OnlyReference(0, proposal.rows, proposal.products, turns=proposal.turns)
         if not record.holds(reference, codes, exclusions.free.reach):
             if not record.holds(reference, codes, exclusions.system.reach):
                 return None

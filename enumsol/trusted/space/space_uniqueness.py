@@ -15,6 +15,7 @@ import numpy as np
 
 from enumsol.arithmetic.balls import SAFE, TINY, UNIT, Ball, upper_norm
 from enumsol.model.sectors import DEEPEST, SECTORS, is_sector, level_of
+from enumsol.trusted.space.confinement import Confinement
 from enumsol.trusted.space.leaves import SpaceRoot, settle
 from enumsol.trusted.space.sector_rows import (
     ALONG,
@@ -551,6 +552,49 @@ class LeafReference(RootReference[Row]):
                 Ball(system.S, system.S_rad), system.rows.G, weights.multipliers(system), off, loaded, balance, share
             )
         return None if form is None else cls(system, tuple(leaf), form, root)
+
+    def _turning(self, turns: Floats) -> SpaceWeights | None:
+        p, m = len(self.system.tau), len(self.system.g)
+        numbers = np.concatenate([np.ones(2 * p), np.zeros(m), turns])
+        return SpaceWeights.of(self.system, numbers) if turns.shape == (m - p,) else None
+
+    def is_sole(self, turns: Floats, reach: Floats) -> bool:
+        """True if this is the only root with |q| within reach, as what is in contact sticks (theory, Theorem 14.14).
+
+        Parameters
+        ----------
+        turns : (m - p,) array
+            theta of all tau, for the multipliers mu = kappa = 1 and nu = 0.
+        reach : (r,) array, may be infinite
+        """
+        weights, system = self._turning(turns), self.system
+        slips = ~np.isin(self.selection, (OPEN, STICK)) & np.any(system.tau >= 0, axis=1)
+        if weights is None or np.any(slips):
+            return False
+        with np.errstate(all="ignore"):
+            body, root = (self.form.S, self.form.G), (self.root.y, self.root.w)
+            within = Confinement.of(body, weights.multipliers(system), root, reach)
+            cost = None if within is None else self._costs_of_changes(weights, within)
+            if within is None or cost is None:
+                return False
+            return self.form.is_sole(cost, within.least, within.left, within.farthest)
+
+    def _costs_of_changes(self, weights: SpaceWeights, within: Confinement) -> Floats | None:
+        """Least costs of changes of w, (m,), of a root without slip; None where one may be nothing."""
+        cost, system = np.zeros(len(self.system.g)), self.system
+        for i, (code, places) in enumerate(zip(self.selection, system.tau, strict=True)):
+            t = places[places >= 0]
+            if code == OPEN:
+                if len(t) and not weights.gap_serves(system, i, self.root.w):
+                    return None
+                continue
+            cost[i] = max(float(self.root.y.mid[i] - self.root.y.rad[i]) / SAFE, 0.0)
+            if len(t):
+                held = within.holds_by(i)
+                if not held > 0:
+                    return None
+                cost[t] = held / system.unit[t] / SAFE
+        return cost
 
     def allow(self, codes: Sequence[int], rows: Sequence[Row], tight: Sequence[Row]) -> bool:
         """True if the first rows are equations, and the others nonnegative but not positive at the root.
