@@ -166,7 +166,7 @@ MESH_OPTIONS = {
     "coupling": Given(_SUPPORT, "NAME=PART[,PART]", _parts),
     "equations": Given(_SUPPORT, "NODE.x:C,NODE.y:C[=VALUE]", _equation),
     "spring": Given(_SUPPORT, "NAME=kn,kt", _numbers),
-    "node_spring": Given(_SUPPORT, "NAME[:NAME]=kx,ky[,kz]", _number_or_numbers),
+    "node_spring": Given(_SUPPORT, "NAME=kx,ky[,kz]", _number_or_numbers),
     "max_rigid_displacement": Given(_SUPPORT, "LENGTH|auto", _auto_or_number, False),
     "load": Given(_LOAD, _PULL, _numbers),
     "load_slope": Given(_LOAD, _PULL, _numbers),
@@ -253,7 +253,7 @@ def solve(
     coupling : Parts over which force and moment of a reference point are distributed.
     equations : A linear equation between displacements, such as tip.x:1,7.x:-1=0.01; may be repeated.
     spring : Springs per area, along the normal and along the tangents.
-    node_spring : Springs at each node, or between two nodes (also one stiffness, along the line between them).
+    node_spring : Springs at each node; as NODE:NODE=... between two (also one stiffness, along the line between them).
     max_rigid_displacement : Let bodies that only contact holds move as a whole, by at most this length; auto: 10 times
         the mesh's size.
     load : Force per area (in 2D per length and unit thickness).

@@ -320,9 +320,10 @@ class CondensedProblem(Sealed):
 def solved(S: Floats, right: Floats) -> Floats:
     """S^-1 times columns; of least length where S is singular within rounding."""
     try:
-        return np.asarray(np.linalg.solve(S, right))
+        found = np.linalg.solve(S, right)
     except np.linalg.LinAlgError:
-        return np.asarray(np.linalg.lstsq(S, right, rcond=None)[0])
+        found = np.full(right.shape, np.nan)
+    return np.asarray(found if np.all(np.isfinite(found)) else np.linalg.lstsq(S, right, rcond=None)[0])
 
 
 def condensation_of(problem: ProblemData) -> CondensedProblem:

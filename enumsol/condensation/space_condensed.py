@@ -25,6 +25,7 @@ if TYPE_CHECKING:
     from enumsol.condensation.enclosure import CondensedEnclosure
     from enumsol.support.array_types import Floats, Indices, Mask
 
+    _Variables = tuple[Ball, Indices, tuple[Floats, Floats, Indices, Floats]]
 
 #: Coefficients between 2^-9 and 2^8 keep tau as it is: S loses no more than twice so many binary digits by them.
 _NEAR_ONE = 8
@@ -258,33 +259,10 @@ class EnclosedSpace(EnclosedSystem, FrictionUnits):
         NotEnclosedError
             Something over- or underflows.
         """
-        problem = enclosure.problem
-        p = problem.p
-        exact = [exactly_at(alpha, *pair) for pair in zip(*(part.T for part in problem.affine_friction), strict=True)]
+        pairs = zip(*(part.T for part in enclosure.problem.affine_friction), strict=True)
+        exact = [exactly_at(alpha, *pair) for pair in pairs]
         F, inexact = (np.array(part).T for part in zip(*map(nearest_floats, exact), strict=True))
-        if (why := _out_of_range(F)) is not None:
-            raise NotEnclosedError(why)
-        units = friction_units(F)
-        F = F * units
-        F_rad = np.where(inexact, 2 * UNIT * F, 0.0)
-        S, S_rad, g, g_rad = enclosure.in_units(alpha, np.tile(force, 3), np.tile(length, 3))
-        tau, rows, node, axis = places(F > 0)
-        unit = np.concatenate([np.ones(p), units[node, axis]])
-        weight = np.concatenate([np.ones(p), F[node, axis]])
-        rad = np.concatenate([np.zeros(p), F_rad[node, axis]])
-        with np.errstate(over="ignore", invalid="ignore"):
-            pair = np.outer(weight, weight)
-            pair_rad = (np.outer(weight + rad, rad) + np.outer(rad, weight)) * SAFE + 4 * UNIT * pair
-            S, S_rad = S[np.ix_(rows, rows)], S_rad[np.ix_(rows, rows)]
-            scaled, scaled_rad = S * pair, np.abs(S) * pair_rad + S_rad * (pair + pair_rad)
-            scaled_rad = (scaled_rad + 4 * UNIT * np.abs(scaled)) * SAFE + TINY
-            load = weight * g[rows]
-            load_rad = weight * g_rad[rows] + rad * (np.abs(g[rows]) + g_rad[rows]) + 4 * UNIT * np.abs(load)
-            load_rad = load_rad * SAFE + TINY
-            own = _on_tau(RigidRows.of(problem, alpha, np.tile(force, 3), np.tile(length, 3)), rows, Ball(weight, rad))
-        if not all(np.all(np.isfinite(array)) for array in (scaled, scaled_rad, load, load_rad)):
-            raise NotEnclosedError(_OVERFLOW)
-        return cls(scaled, scaled_rad, load, load_rad, F, F_rad, tau, unit, rows=own)
+        return _enclosed(enclosure, alpha, (force, length), _variables(F, np.where(inexact, 2 * UNIT * F, 0.0)))
 
 
 @dataclass(frozen=True)
@@ -387,39 +365,23 @@ class AlphaSpace:
     units: tuple[Floats, Floats]
 
     @cached_property
-    def _rows(self) -> tuple[Ball, Indices]:
-        """By what the rows that y takes are multiplied, and where they are among 3p."""
-        F, F_rad, scale, (_, rows, node, axis) = self._friction
-        p = self.enclosure.problem.p
-        ones, none = np.ones(p), np.zeros(p)
-        return Ball(np.r_[ones, (F * scale)[node, axis]], np.r_[none, (F_rad * scale)[node, axis]]), rows
+    def _friction(self) -> tuple[Floats, Floats]:
+        """F with radii."""
+        return _references(self.enclosure.problem, self.reference)
 
     @cached_property
-    def _friction(self) -> tuple[Floats, Floats, Floats, tuple[Indices, Indices, Indices, Indices]]:
-        """F with radii, the powers of two that take it to a size near one, and the ``places`` of tau."""
-        F, F_rad = _references(self.enclosure.problem, self.reference)
-        if (why := _out_of_range(F)) is not None:
-            raise NotEnclosedError(why)
-        return F, F_rad, friction_units(F), places(F > 0)
+    def _variables(self) -> _Variables:
+        return _variables(*self._friction)
+
+    @property
+    def _rows(self) -> tuple[Ball, Indices]:
+        """By what the rows that y takes are multiplied, and where they are among 3p."""
+        return self._variables[:2]
 
     @cached_property
     def fixed(self) -> EnclosedSpace:
         """S, F and the places of tau, which do not depend on alpha, with g at ``reference``."""
-        F, F_rad, scale, (tau, _, node, axis) = self._friction
-        weight, rows = self._rows
-        force, length = self.units
-        S, S_rad, g, g_rad = self.enclosure.in_units(self.reference, np.tile(force, 3), np.tile(length, 3))
-        with np.errstate(over="ignore", invalid="ignore"):
-            scaled = Ball(S, S_rad)[np.ix_(rows, rows)] * weight[:, None] * weight
-            load = weight * Ball(g, g_rad)[rows]
-        if not (scaled.finite and load.finite):
-            raise NotEnclosedError(_OVERFLOW)
-        # the exact S is symmetric
-        S_rad = np.maximum(scaled.rad, scaled.rad.T) + np.abs(scaled.mid - scaled.mid.T)
-        S = np.tril(scaled.mid) + np.tril(scaled.mid, -1).T
-        unit = np.concatenate([np.ones(len(F)), scale[node, axis]])
-        data = S, S_rad * SAFE, load.mid, load.rad, F * scale, F_rad * scale, tau, unit
-        return EnclosedSpace(*data, rows=self._rigid(self.reference))
+        return _enclosed(self.enclosure, self.reference, self.units, self._variables)
 
     @cached_property
     def _quotients(self) -> list[tuple[Fraction, Fraction]]:
@@ -504,6 +466,40 @@ class AlphaSpace:
         rows = RigidRows.of(self.enclosure.problem, alpha, np.tile(force, 3), np.tile(length, 3))
         weight, own = self._rows
         return _on_tau(rows, own, weight)
+
+
+def _variables(F: Floats, F_rad: Floats) -> _Variables:
+    """By what the rows that y takes are multiplied, where they are among 3p, and F, its radii, ``tau`` and ``unit``.
+
+    Raises
+    ------
+    NotEnclosedError
+        A coefficient is too small or too large for float64.
+    """
+    if (why := _out_of_range(F)) is not None:
+        raise NotEnclosedError(why)
+    scale, (tau, rows, node, axis), ones = friction_units(F), places(F > 0), np.ones(len(F))
+    F, F_rad = F * scale, F_rad * scale
+    weight = Ball(np.append(ones, F[node, axis]), np.append(0.0 * ones, F_rad[node, axis]))
+    return weight, rows, (F, F_rad, tau, np.append(ones, scale[node, axis]))
+
+
+def _enclosed(
+    enclosure: CondensedEnclosure, alpha: Fraction, units: tuple[Floats, Floats], variables: _Variables
+) -> EnclosedSpace:
+    """Balls for the data at alpha in these variables, in units of force and length of the nodes, (p,) each."""
+    (weight, rows, of_friction), (force, length) = variables, (np.tile(unit, 3) for unit in units)
+    S, S_rad, g, g_rad = enclosure.in_units(alpha, force, length)
+    with np.errstate(over="ignore", invalid="ignore"):
+        scaled = Ball(S, S_rad)[np.ix_(rows, rows)] * weight[:, None] * weight
+        load = weight * Ball(g, g_rad)[rows]
+        own = _on_tau(RigidRows.of(enclosure.problem, alpha, force, length), rows, weight)
+    if not (scaled.finite and load.finite):
+        raise NotEnclosedError(_OVERFLOW)
+    # the exact S is symmetric
+    S_rad = np.maximum(scaled.rad, scaled.rad.T) + np.abs(scaled.mid - scaled.mid.T)
+    S = np.tril(scaled.mid) + np.tril(scaled.mid, -1).T
+    return EnclosedSpace(S, S_rad * SAFE, load.mid, load.rad, *of_friction, rows=own)
 
 
 def _nearest(exact: Sequence[Fraction]) -> Ball:

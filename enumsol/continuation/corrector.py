@@ -7,6 +7,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from enumsol.condensation.condensed import solved
+
 if TYPE_CHECKING:
     from enumsol.continuation.continuation_options import ContinuationOptions
     from enumsol.continuation.scaled_equation import ScaledEquation
@@ -101,7 +103,8 @@ def smooth_newton(
         right = np.append(equation.selection_residual(rows, x), defect)
         if not (np.all(np.isfinite(matrix)) and np.all(np.isfinite(right))):
             return None
-        step = _solve(matrix, right)
+        # of least length where a vertical segment ends in a bifurcation point
+        step = solved(matrix, right)
         if not np.max(np.abs(step)) <= MAX_CORRECTION:
             return None
         x = x - step
@@ -111,11 +114,3 @@ def smooth_newton(
             return x
         last = length
     return None
-
-
-def _solve(matrix: Floats, right: Floats) -> Floats:
-    """Newton step; of least length where the matrix is singular (a vertical segment ends in a bifurcation point)."""
-    try:
-        return np.asarray(np.linalg.solve(matrix, right))
-    except np.linalg.LinAlgError:
-        return np.asarray(np.linalg.lstsq(matrix, right, rcond=None)[0])

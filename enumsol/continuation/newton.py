@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from enumsol.condensation.condensed import condensation_of
+from enumsol.condensation.condensed import condensation_of, solved
 from enumsol.continuation.condensed_equation import CondensedEquation
 from enumsol.continuation.disc_equation import DiscEquation
 from enumsol.continuation.start import check_problem, equation_on
@@ -27,7 +27,7 @@ if TYPE_CHECKING:
     from enumsol.continuation.scaled_equation import ScaledEquation
     from enumsol.model.problem import ContactProblem
     from enumsol.model.problem3d import AnyProblem
-    from enumsol.support.array_types import Alpha, AlphaLike, ArrayLike, Codes, Floats, Mask
+    from enumsol.support.array_types import Alpha, AlphaLike, ArrayLike, Codes, Floats
 
 #: Shortest fraction of a Newton step that the line search tries.
 MIN_FRACTION = 2.0**-12
@@ -191,7 +191,8 @@ def _iterate(equation: ScaledEquation, x: Floats, alpha: float, max_iterations: 
             return x
         damped = damped or rows.tobytes() in seen
         seen.add(rows.tobytes())
-        step = _newton_step(equation, rows, x)
+        # the shortest least-squares one where the selection is singular
+        step = solved(equation.jacobian(rows, x)[:, :-1], equation.selection_residual(rows, x))
         fraction = _fraction(equation, x, step) if damped else 1.0
         history.append(NewtonIteration(residual, fraction, changes))
         if fraction < MIN_FRACTION:
@@ -199,19 +200,6 @@ def _iterate(equation: ScaledEquation, x: Floats, alpha: float, max_iterations: 
         x = x.copy()
         x[:-1] -= fraction * step
     raise NotConverged(alpha, history, f"the limit of {counted(max_iterations, 'iteration')} was reached")
-
-
-def _newton_step(equation: ScaledEquation, rows: Mask, x: Floats) -> Floats:
-    """Newton step in the active selection; the shortest least-squares one where it is singular."""
-    J = equation.jacobian(rows, x)[:, :-1]
-    residual = equation.selection_residual(rows, x)
-    try:
-        step = np.linalg.solve(J, residual)
-    except np.linalg.LinAlgError:
-        step = np.full(len(residual), np.nan)
-    if not np.all(np.isfinite(step)):
-        step = np.linalg.lstsq(J, residual, rcond=None)[0]
-    return np.asarray(step)
 
 
 def _fraction(equation: ScaledEquation, x: Floats, step: Floats) -> float:

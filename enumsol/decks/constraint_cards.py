@@ -52,7 +52,9 @@ def mpc(reading: Reading, given: Card) -> str:
         if kind == "BEAM":
             reading.analysis.couplings.append(Coupling(place, given.name, one, two))
         else:
-            reading.analysis.equations += [NodalEquation(place, ((one, k, 1.0), (two, k, -1.0))) for k in (1, 2, 3)]
+            reading.analysis.equations += [
+                NodalEquation(place, ((one, k, 1.0), (two, k, -1.0)), given.name) for k in (1, 2, 3)
+            ]
     return "nodes that move together"
 
 

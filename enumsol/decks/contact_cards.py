@@ -144,8 +144,8 @@ def _length(given: Card, option: str, expected: str) -> float | None:
     if not text:
         return None
     try:
-        return given.number(text, 0)
-    except IndexError:
+        return float(text)
+    except ValueError:
         raise given.refused(f"has {option}={text}; expected {expected}") from None
 
 

@@ -163,10 +163,13 @@ class NodalEquation:
     place : DeckPlace
     terms : tuple of (target, component, coefficient)
         The target is a number or the name of a set.
+    card : str
+        EQUATION or MPC, of which the equations of components that a plane body lacks do not count.
     """
 
     place: DeckPlace
     terms: tuple[tuple[str, int, float], ...]
+    card: str = "EQUATION"
 
 
 @dataclass(frozen=True)

@@ -162,8 +162,8 @@ def check_held(pieces: Sequence[BodyPiece], points: Floats, hold: sp.csc_array) 
     for piece in pieces:
         if piece.free_motions(points, hold):
             raise InvalidProblemError(
-                f"{piece.name} is free to move as a rigid body; expected clamp, symmetry, displacement or spring to "
-                "hold it (contact alone does not); or max_rigid_displacement, if contact alone is to hold it"
+                f"{piece.name} is free to move as a rigid body; expected clamp, symmetry, displacement, spring or tie "
+                "to hold it (contact alone does not); or max_rigid_displacement, if contact alone is to hold it"
             )
 
 

@@ -72,11 +72,18 @@ class Elimination:
 
 @dataclass
 class _Row:
-    """A displacement in terms of others: ``value + alpha slope`` plus ``terms``; of sums, what they are made of."""
+    """A displacement in terms of others: ``value + alpha slope`` plus ``terms``; of sums, what they are made of.
+
+    ``size`` is the largest of what value and slope are sums of.
+    """
 
     terms: dict[int, float]
     value: float
     slope: float
+    size: tuple[float, float] = (0.0, 0.0)
+
+    def __post_init__(self) -> None:
+        self.size = max(self.size[0], abs(self.value)), max(self.size[1], abs(self.slope))
 
     def put_in(self, dof: int, other: _Row) -> None:
         """Put another row in for a displacement."""
@@ -89,6 +96,7 @@ class _Row:
                 self.terms[own] = total
         self.value += factor * other.value
         self.slope += factor * other.slope
+        self.size = max(self.size[0], abs(factor) * other.size[0]), max(self.size[1], abs(factor) * other.size[1])
 
 
 def eliminated(
@@ -148,15 +156,13 @@ def _solved(
     for equation in equations:
         own = _Row({}, -equation.value, -equation.slope)
         largest = float(np.max(np.abs(equation.coefficients)))
-        size = [abs(equation.value), abs(equation.slope)]
         for dof, coefficient in zip(equation.dofs.tolist(), equation.coefficients.tolist(), strict=True):
             known = _Row({}, values[dof], slopes[dof]) if fixed[dof] else rows.get(dof, _Row({dof: 1.0}, 0.0, 0.0))
             own.terms[-1] = coefficient  # no displacement has this number
             own.put_in(-1, known)
-            size = [max(one, abs(coefficient * two)) for one, two in zip(size, (known.value, known.slope), strict=True)]
         terms = {dof: value for dof, value in own.terms.items() if abs(value) > _ROUNDED * largest}
         if not terms:
-            if abs(own.value) > _ROUNDED * size[0] or abs(own.slope) > _ROUNDED * size[1]:
+            if abs(own.value) > _ROUNDED * own.size[0] or abs(own.slope) > _ROUNDED * own.size[1]:
                 of = ", ".join(dict.fromkeys(named(dof) for dof in equation.dofs.tolist()[:4]))
                 raise InvalidArgumentError(
                     f"{equation.name} contradicts what supports and other equations give for {of}; expected equations "
@@ -167,7 +173,8 @@ def _solved(
         most = _SMALL * max(map(abs, terms.values()))
         pivot = next(dof for dof, value in terms.items() if abs(value) >= most)
         factor = -terms.pop(pivot)
-        row = _Row({dof: value / factor for dof, value in terms.items()}, own.value / factor, own.slope / factor)
+        size = own.size[0] / abs(factor), own.size[1] / abs(factor)
+        row = _Row({dof: value / factor for dof, value in terms.items()}, own.value / factor, own.slope / factor, size)
         for user in users.pop(pivot, ()):
             if pivot in rows[user].terms:
                 rows[user].put_in(pivot, row)

@@ -9,71 +9,19 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from enumsol.decks.model import Surface
 from enumsol.errors import InvalidArgumentError
-from enumsol.fem.mesh_files import mesh_of_deck
 
 if TYPE_CHECKING:
     from enumsol.decks.cards import DeckPlace
     from enumsol.decks.model import Deck, Section
     from enumsol.decks.states import DeckState
     from enumsol.decks.steps import ContactPair
-    from enumsol.fem.meshes import PartedMesh
+    from enumsol.fem.deck_joints import DeckJoints
+    from enumsol.fem.deck_parts import DeckParts
     from enumsol.support.array_types import Floats, Integers
 
 #: Families of plane elements, and what `mesh_problem` calls them.
 _PLANES = {"plane strain": "strain", "plane stress": "stress", "axisymmetric": "axisymmetric"}
-
-
-class DeckParts:
-    """Named parts of a deck: those that it has, and those on which something acts, which get names of their own."""
-
-    def __init__(self, deck: Deck) -> None:
-        self._deck = deck
-        self._names: dict[tuple[str, bytes], str] = {}
-        self._taken = {*deck.node_sets, *deck.element_sets, *deck.surfaces}
-
-    def nodes(self, rows: Integers, wanted: str) -> str:
-        """Name of a set of nodes, the one that is wanted if it has these."""
-        return self._named(self._deck.node_sets, np.unique(rows), wanted, lambda own: own)
-
-    def elements(self, rows: Integers, wanted: str) -> str:
-        """Name of a set of elements."""
-        return self._named(self._deck.element_sets, np.unique(rows), wanted, lambda own: own)
-
-    def faces(self, faces: Integers, wanted: str, place: DeckPlace) -> str:
-        """Name of a surface of faces (k, 2)."""
-        return self._named(
-            self._deck.surfaces,
-            np.unique(faces, axis=0),
-            wanted,
-            lambda own: Surface(place, own),
-            lambda own: own.faces,
-        )
-
-    def _named(self, sets: Any, rows: Integers, wanted: str, made: Any, of: Any = lambda own: own) -> str:
-        key = (str(id(sets)), rows.tobytes())
-        if key in self._names:
-            return self._names[key]
-        name = wanted
-        if not (name in sets and np.array_equal(np.sort(of(sets[name]), axis=0), rows)):
-            count = 1
-            while name in self._taken:
-                count += 1
-                name = f"{wanted} ({count})"
-            sets[name] = made(rows)
-            self._taken.add(name)
-        self._names[key] = name
-        return name
-
-    def in_bodies(self, rows: Integers) -> Integers:
-        """Nodes among these that belong to bodies."""
-        own = [block.nodes.ravel() for block in self._deck.blocks if block.type.is_body]
-        return rows[np.isin(rows, np.concatenate(own))] if own else rows[:0]
-
-    def mesh(self) -> PartedMesh:
-        """Mesh of the deck with all of these."""
-        return mesh_of_deck(self._deck)
 
 
 # -- the same in all steps -------------------------------------------------------------------------------------------
@@ -109,9 +57,9 @@ def _materials(deck: Deck, parts: DeckParts) -> dict[str, Any]:
     options: dict[str, Any] = {name: found[name] for name in ("young", "poisson")}
     if found["density"].keys() == found["young"].keys():
         options["density"] = found["density"]
-    if set(found["thickness"].values()) != {1.0} and _is_plane(deck):
+    if set(found["thickness"].values()) != {1.0} and is_plane(deck):
         options["thickness"] = found["thickness"]
-    if _is_plane(deck):
+    if is_plane(deck):
         options["plane"] = _planes(deck, parts)
     return options
 
@@ -149,7 +97,8 @@ def _sections(deck: Deck) -> list[tuple[Section, Integers]]:
     return found
 
 
-def _is_plane(deck: Deck) -> bool:
+def is_plane(deck: Deck) -> bool:
+    """True for a deck of plane elements."""
     return any(block.type.family in _PLANES for block in deck.blocks)
 
 
@@ -171,7 +120,6 @@ def _contacts(deck: Deck) -> dict[str, Any]:
     said = deck.analysis
     if not said.pairs:
         raise InvalidArgumentError(f"{deck.path} has no *CONTACT PAIR; expected contact")
-    pairs = []
     for pair in said.pairs:
         for name in (pair.slave, pair.master):
             if name not in deck.surfaces:
@@ -184,25 +132,21 @@ def _contacts(deck: Deck) -> dict[str, Any]:
                 f"{pair.place}: *CONTACT PAIR names the interaction {pair.interaction or 'nothing'}; expected one of "
                 f"{', '.join(said.interactions) or 'none'}"
             )
-        if pair.tied or said.interactions[pair.interaction].tied:
-            raise InvalidArgumentError(f"{pair.place}: the surfaces of *CONTACT PAIR are tied, which is not read")
-        pairs.append((pair.slave, pair.master, *_gap(pair)))
-    others = ("TIE", said.ties), ("EQUATION", said.equations), ("SPRING", said.springs), ("TRANSFORM", said.transforms)
-    for card, each in others:
-        for own in each:
-            raise InvalidArgumentError(f"{own.place}: *{card} is not used here, and would change the answer")
-    for coupling in said.couplings:
-        raise InvalidArgumentError(f"{coupling.place}: *{coupling.card} is not used here, and would change the answer")
+    pairs = [(pair.slave, pair.master, *_gap(pair)) for pair in touching(deck)]
+    if not pairs:
+        raise InvalidArgumentError(f"{said.pairs[0].place}: all surfaces of *CONTACT PAIR are tied; expected contact")
     return {"pairs": pairs}
+
+
+def touching(deck: Deck) -> list[ContactPair]:
+    """Pairs of surfaces that are not tied."""
+    said = deck.analysis
+    return [pair for pair in said.pairs if not (pair.tied or said.interactions[pair.interaction].tied)]
 
 
 def _gap(pair: ContactPair) -> list[Any]:
     """The gap of a pair, where it is not that of the geometry."""
-    if pair.clearance is not None:
-        return [pair.clearance]
-    if pair.adjust is not None:
-        raise InvalidArgumentError(f"{pair.place}: ADJUST is not read")
-    return []
+    return [] if pair.clearance is None else [pair.clearance]
 
 
 def friction(deck: Deck, step: int) -> dict[str, float]:
@@ -214,7 +158,7 @@ def friction(deck: Deck, step: int) -> dict[str, float]:
         A surface has two.
     """
     said, found = deck.analysis, dict[str, float]()
-    for pair in said.pairs:
+    for pair in touching(deck):
         value = said.interactions[pair.interaction].friction
         for own in said.steps[:step]:
             value = own.friction.get(pair.interaction, value)
@@ -229,7 +173,7 @@ def friction(deck: Deck, step: int) -> dict[str, float]:
 # -- what acts in a step ---------------------------------------------------------------------------------------------
 
 
-def acting(deck: Deck, parts: DeckParts, state: DeckState) -> dict[str, Any]:
+def acting(deck: Deck, parts: DeckParts, state: DeckState, joints: DeckJoints) -> dict[str, Any]:
     """Options for what is given at the end of a step.
 
     Raises
@@ -240,52 +184,77 @@ def acting(deck: Deck, parts: DeckParts, state: DeckState) -> dict[str, Any]:
     if state.of("TEMPERATURE"):
         place = next(place for key, place in state.places.items() if key[0] == "TEMPERATURE")
         raise InvalidArgumentError(f"{place}: *TEMPERATURE is not read")
+    joints.check_grounds(state)
+    bodies, points = _on_nodes(deck, parts, state, joints, "BOUNDARY")
+    forces, loads = _on_nodes(deck, parts, state, joints, "CLOAD")
+    d, turns = joints.dimension, joints.dimension * (joints.dimension - 1) // 2
+    for name in dict.fromkeys(joints.points.values()):
+        given = points.get(name, {})
+        held = {d + k: 0.0 for k in range(turns)} if name not in joints.rigid else {}
+        if given or held:
+            bodies[name] = [{**held, **given}.get(k) for k in range(d + turns)]
+    moments: dict[str, Any] = {}
+    for name, given in loads.items():
+        if any(k < d for k in given):
+            forces[name] = [given.get(k, 0.0) for k in range(d)]
+        if any(k >= d for k in given):
+            moments[name] = [given.get(d + k, 0.0) for k in range(turns)] if d == 3 else given[d]
     options = {
-        "displacement": _on_nodes(deck, parts, state, "BOUNDARY", free=None),
-        "force": _on_nodes(deck, parts, state, "CLOAD", free=0.0),
+        "displacement": bodies,
+        "force": forces,
+        "moment": moments,
         "pressure": _pressures(deck, parts, state),
         "body_force": _volume_forces(deck, parts, state),
     }
     return {name: value for name, value in options.items() if value}
 
 
-def _on_nodes(deck: Deck, parts: DeckParts, state: DeckState, kind: str, free: float | None) -> dict[str, list[Any]]:
-    """Displacements or forces by sets of nodes: nodes for which the same lines give the same."""
-    dimension = 2 if _is_plane(deck) else 3
-    of_node: dict[int, dict[int, float]] = {}
-    by: dict[int, list[DeckPlace]] = {}
+def _on_nodes(
+    deck: Deck, parts: DeckParts, state: DeckState, joints: DeckJoints, kind: str
+) -> tuple[dict[str, list[Any]], dict[str, dict[int, float]]]:
+    """Displacements or forces by sets of nodes to which a line gives the same; and of reference points.
+
+    The first by components, the second by entries, of which rotations are the last.
+    """
+    dimension, free = joints.dimension, None if kind == "BOUNDARY" else 0.0
+    of_lines: dict[DeckPlace, dict[int, dict[int, float]]] = {}
+    points: dict[str, dict[int, float]] = {}
     for (node, component), value in state.of(kind).items():
+        row, number = int(node), int(component)
         place = state.places[kind, node, component]
-        if int(component) > dimension:
+        slot = joints.slot(row, number)
+        entry = number - 1 if slot is None else slot[1]
+        if entry < 0 or (slot is None and number > dimension):
             if value:
                 what = "moves" if kind == "BOUNDARY" else "loads"
                 raise InvalidArgumentError(
-                    f"{place}: *{kind} {what} node {deck.node_name(int(node))} in component {component}; expected "
-                    f"components 1 to {dimension} of a node of a body"
+                    f"{place}: *{kind} {what} node {deck.node_name(row)} in component {number}; expected components "
+                    f"1 to {dimension}, or rotations of the reference node of a rigid body"
                 )
-            continue
-        of_node.setdefault(int(node), {})[int(component)] = value
-        by.setdefault(int(node), []).append(place)
-    groups: dict[Any, list[int]] = {}
-    for node, given in of_node.items():
-        groups.setdefault((tuple(sorted(set(by[node]))), tuple(sorted(given.items()))), []).append(node)
-    found = {}
-    for (places, given), nodes in groups.items():
-        rows = parts.in_bodies(np.array(nodes))
-        if len(rows):
-            own = dict(given)
-            name = parts.nodes(rows, _wanted(deck, rows, f"{kind.lower()} of line {places[0].line}"))
-            found[name] = [own.get(k, free) for k in range(1, dimension + 1)]
-    return found
+        elif slot is not None:
+            points.setdefault(slot[0], {})[entry] = value
+        else:
+            of_lines.setdefault(place, {}).setdefault(row, {})[entry] = value
+    found: dict[str, list[Any]] = {}
+    for place, nodes in of_lines.items():
+        parts.told_of_loose(np.array(list(nodes)), kind, place)
+        groups: dict[Any, list[int]] = {}
+        for row, own in nodes.items():
+            groups.setdefault(tuple(sorted(own.items())), []).append(row)
+        for given, rows in groups.items():
+            inside = parts.in_bodies(np.array(rows))
+            if len(inside):
+                wanted = _wanted(deck, inside, f"{kind.lower()} of line {place.line}")
+                name = parts.nodes(inside, wanted) if kind == "BOUNDARY" else parts.exactly(inside, wanted)
+                for k, value in given:
+                    found.setdefault(name, [free] * dimension)[k] = value
+    return found, points
 
 
 def _wanted(deck: Deck, rows: Integers, otherwise: str) -> str:
     """Name of a set of nodes that has just these, or another one."""
-    same = (
-        name
-        for name, own in deck.node_sets.items()
-        if len(own) == len(rows) and np.array_equal(np.sort(own), np.sort(rows))
-    )
+    ordered = np.sort(rows)
+    same = (name for name, own in deck.node_sets.items() if np.array_equal(np.sort(own), ordered))
     return next(same, otherwise)
 
 
@@ -306,7 +275,7 @@ def _pressures(deck: Deck, parts: DeckParts, state: DeckState) -> dict[str, floa
 
 def _volume_forces(deck: Deck, parts: DeckParts, state: DeckState) -> dict[str, list[float]]:
     """Forces per volume by sets of elements: gravity by the density of each material, and those that are given."""
-    dimension = 2 if _is_plane(deck) else 3
+    dimension = 2 if is_plane(deck) else 3
     total: dict[int, Floats] = {}
     for (target, direction), value in state.of("GRAV").items():
         place = state.places["GRAV", target, direction]

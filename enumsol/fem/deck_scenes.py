@@ -16,7 +16,9 @@ import numpy as np
 from enumsol.decks.reading import described
 from enumsol.decks.states import states_of
 from enumsol.errors import InvalidArgumentError, InvalidProblemError
-from enumsol.fem.deck_options import DeckParts, acting, friction, shared
+from enumsol.fem.deck_joints import DeckJoints
+from enumsol.fem.deck_options import acting, friction, is_plane, shared
+from enumsol.fem.deck_parts import DeckParts
 from enumsol.fem.mesh_problems import mesh_scene
 from enumsol.loading.steps import LoadStep
 from enumsol.support.arguments import file_path, positive_integer
@@ -92,8 +94,10 @@ class DeckModel:
         states = self._states()
         self._parts = DeckParts(self.deck)
         common = shared(self.deck, self._parts)
+        joints = DeckJoints(self.deck, self._parts, 2 if is_plane(self.deck) else 3)
+        common |= joints.options
         self._options = [
-            {**common, **acting(self.deck, self._parts, state), "friction": friction(self.deck, number)}
+            {**common, **acting(self.deck, self._parts, state, joints), "friction": friction(self.deck, number)}
             for number, state in enumerate(states, 1)
         ]
 
@@ -130,15 +134,21 @@ class DeckModel:
         """
         number = self._number(step)
         if number not in self._scenes:
-            options = self._options[number - 1]
             try:
-                scene = mesh_scene(self.mesh, **options)
-                if any(piece.free_motions(scene.mesh.points, scene.hold) for piece in scene.pieces):
-                    scene = mesh_scene(self.mesh, **options, max_rigid_displacement="auto")
+                self._scenes[number] = self._made(self._options[number - 1])
             except InvalidArgumentError as error:
                 raise InvalidProblemError(f"{self.deck.path}: {error}") from error
-            self._scenes[number] = scene
         return self._scenes[number]
+
+    def _made(self, options: dict[str, Any]) -> Scene:
+        scene = mesh_scene(self.mesh, **options)
+        moved = self._parts.adjusted(scene)
+        if moved is not None:
+            self.mesh = moved
+            scene = mesh_scene(moved, **options)
+        if any(piece.free_motions(scene.mesh.points, scene.hold) for piece in scene.moving):
+            scene = mesh_scene(self.mesh, **options, max_rigid_displacement="auto")
+        return scene
 
     def problem(self, step: int | None = None) -> AnyProblem:
         """Contact problem at the end of a step (from 1), reached from no load at once.

@@ -45,7 +45,7 @@ if TYPE_CHECKING:
 
 #: Options that say what a part of the boundary is for.
 _USES = (
-    *("contact", "clamp", "symmetry", "displacement", "displacement_slope", "spring"),
+    *("contact", "clamp", "symmetry", "displacement", "displacement_slope", "transform", "spring", "node_spring"),
     *("load", "load_slope", "pressure", "pressure_slope", "force", "force_slope"),
 )
 
@@ -146,6 +146,13 @@ class Scene:
     def uses(self, part: str) -> list[str]:
         """Uses of a part of the boundary, as the options name it."""
         found = [name for name in _USES if part in _names(getattr(self.options, name))]
+        found += [
+            f"{what} of {name}"
+            for what in ("rigid", "coupling")
+            for name, parts in (getattr(self.options, what) or {}).items()
+            if part in _names(parts)
+        ]
+        found += [f"tie {own[0]}:{own[1]}" for own in self.options.tie if part in own[:2]]
         pairs = [group.pair for group in self.contacts.groups if group.pair is not None]
         found += [f"contact nodes of the pair {pair}" for pair in pairs if part == pair.slave]
         return found + [f"facets of the pair {pair}" for pair in pairs if part == pair.master]
@@ -211,7 +218,7 @@ class Scene:
             mass=self._mass(),
             mesh=lambda motion, moved: BodyMesh(mesh.points, mesh.cells, motion, moved, surface, **self._kept()),
             gap=gaps,
-            node_ids=nodes.nodes.tolist(),
+            node_ids=mesh.node_names(nodes.nodes),
             coordinates=mesh.points[nodes.nodes],
             max_rigid_displacement=bound,
             **coefficients,
@@ -365,9 +372,14 @@ def _parts(scene: Scene) -> list[str]:
 
 
 def _loads(scene: Scene) -> list[str]:
-    lines = [f"resultant {_resultant(scene.forces)}"]
-    if np.any(scene.slope):
-        lines.append(f"times alpha: resultant {_resultant(scene.slope)}")
+    known = scene.joints.references
+    every = [
+        np.concatenate([own, more.reshape(-1, known.each)[:, : scene.dimension]])
+        for own, more in ((scene.forces, scene.joints.forces), (scene.slope, scene.joints.slope))
+    ]
+    lines = [f"resultant {_resultant(every[0])}"]
+    if np.any(every[1]):
+        lines.append(f"times alpha: resultant {_resultant(every[1])}")
     return lines
 
 

@@ -243,6 +243,43 @@ def test_materials_and_friction_by_part_in_a_file_on_the_command_line_and_in_a_c
     assert read_problem("two.npz").fingerprint == direct.fingerprint == fem.read_mesh_problem("two.toml").fingerprint
 
 
+def test_joints_in_a_file_on_the_command_line_and_in_a_call(two_bodies, capsys):
+    text = (
+        "mesh = 'two.msh'\nyoung = 2.5\npoisson = 0.25\nfriction = 0.1\ncontact = 'floor'\ntie = [['upper', 'lower']]\n"
+        "reference.P = [0.5, 3.0]\nrigid.P = ['roof']\nforce.P = [0.0, -0.1]\nmoment.P = 0.01\nmoment_slope.P = 0.02\n"
+        "node_spring.P = [1.0, 0.0, 2.0]\nnode_spring.upper = [0.5, 0.25]\nforce_slope.lower = [0.0, 0.1]\n"
+        "transform.lower.rectangular = [1.0, 1.0]\ndisplacement_slope.P = [0.0, 'free', 'free']\n"
+        "equations = [{terms = [['P', 'rz', 1.0], ['P', 'y', -2.0]], value = 0.01}]\nbody_force_slope = [0.0, -0.1]\n"
+        "max_rigid_displacement = 'auto'\n"
+    )
+    (two_bodies / "joined.toml").write_text(text)
+    command = (
+        "solve two.msh --young 2.5 --poisson 0.25 --friction 0.1 --contact floor --tie upper:lower --reference P=0.5,3 "
+        "--rigid P=roof --force P=0,-0.1 --moment P=0.01 --moment-slope P=0.02 --node-spring P=1,0,2 "
+        "--node-spring upper=0.5,0.25 --force-slope lower=0,0.1 --transform lower=rectangular:1,1 "
+        "--displacement-slope P=0,free,free --equations P.rz:1,P.y:-2=0.01 --body-force-slope 0,-0.1 "
+        "--max-rigid-displacement auto -o joined.npz"
+    )
+    printed(capsys, *command.split(), note="wrote a problem")
+    direct = fem.mesh_problem(
+        "two.msh", young=2.5, poisson=0.25, friction=0.1, contact="floor", tie=[("upper", "lower")],
+        reference={"P": (0.5, 3)}, rigid={"P": "roof"}, force={"P": (0, -0.1)}, moment={"P": 0.01},
+        moment_slope={"P": 0.02}, node_spring={"P": (1, 0, 2), "upper": (0.5, 0.25)}, force_slope={"lower": (0, 0.1)},
+        transform={"lower": {"rectangular": (1, 1)}}, displacement_slope={"P": (0, "free", "free")},
+        equations=[{"terms": [("P", "rz", 1), ("P", "y", -2)], "value": 0.01}], body_force_slope=(0, -0.1),
+        max_rigid_displacement="auto",
+    )  # fmt: skip
+    assert read_problem("joined.npz").fingerprint == direct.fingerprint
+    assert fem.read_mesh_problem("joined.toml").fingerprint == direct.fingerprint
+    out = printed(capsys, "solve", "joined.toml", "--dry-run")
+    assert "joints    P: rigid with 2 nodes of roof" in out
+    assert "tie upper:lower: 2 nodes" in out
+    assert "resultant (0, -0.1)" in out
+    wrong = run(capsys, *command.replace("P.rz:1", "rz:1").split())
+    assert wrong[0] == 2
+    assert "expected NODE.x:NUMBER" in wrong[2]
+
+
 @pytest.mark.parametrize("toml", [False, True])
 def test_what_was_understood(here, capsys, toml):
     command = ("body.toml",) if toml else ("body.msh", *OPTIONS)

@@ -83,8 +83,8 @@ def deck(*, mesh=MESH, materials=MATERIALS, contact=CONTACT, held=HELD, steps=PR
     return mesh.format(type=type) + materials + contact + held + steps
 
 
-def mesh(facets=(), nodes=(), bodies=()):
-    """The same mesh by hand, with more parts by rows of nodes or of cells."""
+def mesh(facets=(), nodes=(), bodies=(), third=False):
+    """The same mesh by hand, with more parts by rows of nodes or of cells; and a third block beside the upper one."""
     points = [[0, 0], [1, 0], [2, 0], [0, 1], [1, 1], [2, 1], [0, 1], [1, 1], [2, 1], [0, 3], [1, 3], [2, 3]]
     cells = [[0, 1, 4, 3], [1, 2, 5, 4], [6, 7, 10, 9], [7, 8, 11, 10]]
     named = {
@@ -96,6 +96,10 @@ def mesh(facets=(), nodes=(), bodies=()):
     }
     sets = {"BOTTOM": [0, 1, 2], "TOP": [9, 10, 11], "SIDE": [6, 9], **dict(nodes)}
     parts = {"LOWER": [0, 1], "UPPER": [2, 3], **dict(bodies)}
+    if third:
+        points += [[2, 1], [3, 1], [2, 3], [3, 3]]
+        cells += [[12, 13, 15, 14]]
+        named["LEFT"], parts["THIRD"] = [[14, 12]], [4]
     return fem.PartedMesh(
         np.array(points, dtype=float),
         np.array(cells),
