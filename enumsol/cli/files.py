@@ -203,7 +203,10 @@ def _references(place: Path) -> list[str]:
             from enumsol.support.saved import toml_from  # numpy: not for --help
 
             told = toml_from(place.read_bytes())
-            return [name for key in ("mesh", "steps") if isinstance(name := told.get(key), str) and name]
+            named = [told.get("mesh"), told.get("steps")]
+            if isinstance(named[0], dict):  # several meshes, some of them placed
+                named += [mesh.get("mesh") if isinstance(mesh, dict) else mesh for mesh in named[0].values()]
+            return [name for name in named if isinstance(name, str) and name]
         pattern = _REFERENCES.get(place.suffix.lower())
         found = [] if pattern is None else re.findall(pattern, place.read_bytes())
         return [os.fsdecode(name.strip().strip(b"\"'")) for name in found if b"\0" not in name]

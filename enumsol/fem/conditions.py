@@ -14,8 +14,8 @@ import numpy as np
 import scipy.sparse as sp
 
 from enumsol.errors import InvalidArgumentError
-from enumsol.fem.mesh_files import read_mesh
 from enumsol.fem.meshes import SAME, unit_vectors
+from enumsol.fem.placing import mesh_of
 from enumsol.fem.restrained import RIGHT_ANGLE, Supports
 from enumsol.model.problem import given_friction, old_friction
 from enumsol.support.arguments import finite_number, one_of, shown
@@ -109,7 +109,7 @@ def refuse_old_friction(source: object, options: Mapping[str, Any], written: Wri
     """
     if not any(map(_is_pair, (own for name in FRICTION for _, own in _by_part(options.get(name))))):
         return source
-    mesh = read_mesh(source, options.get("groups"))
+    mesh = mesh_of(source, options.get("groups"))
     along_axes(mesh.points.shape[1], options, written)
     return mesh
 

@@ -21,8 +21,8 @@ from enumsol.fem.bodies import pieces_of
 from enumsol.fem.conditions import Options, refuse_old_friction
 from enumsol.fem.contacts import contacts_of
 from enumsol.fem.joints import joints_of
-from enumsol.fem.mesh_files import read_mesh
 from enumsol.fem.meshes import PartedMesh, lame
+from enumsol.fem.placing import in_folder, mesh_of
 from enumsol.fem.scene_checks import refuse_overlaps, refuse_pairs, refuse_walls, scene_notes
 from enumsol.fem.scenes import Scene
 from enumsol.support.arguments import file_path, finite_number, one_of, positive_number, shown, text_of
@@ -51,7 +51,7 @@ def scene_of(source: PartedMesh | str | os.PathLike[str] | Any, options: Options
     InvalidArgumentError
         As `mesh_problem`.
     """
-    mesh = source if isinstance(source, PartedMesh) else read_mesh(source, options.groups)
+    mesh = mesh_of(source, options.groups)
     options = options.with_friction_along_axes(mesh.points.shape[1])
     if options.plane is None:
         options = replace(options, plane=_plane(mesh))
@@ -228,8 +228,11 @@ def mesh_problem(
 
     Parameters
     ----------
-    mesh : PartedMesh, path, or meshio.Mesh
-        What `read_mesh` returns or takes. Parts are called by their names.
+    mesh : PartedMesh, path, meshio.Mesh, or mapping of names to these
+        What `read_mesh` returns or takes. Parts are called by their names. Of several meshes each may be a mapping with
+        ``mesh``, ``move`` [length] and ``turn``, an angle about the origin before the move [degrees], in 3D the x, y, z
+        of an axis and the angle. The names of their parts then begin with that of the mesh, as in "pad.top", and the
+        name of the mesh is a part of the body.
     young, poisson : float, or mapping of names to float
         Young's modulus [force / length^2] and Poisson's ratio [-], of the whole body or of every part of it
         (``mesh.bodies``).
@@ -315,9 +318,9 @@ def mesh_problem(
     Returns
     -------
     ContactProblem or ContactProblem3D
-        With ``coordinates``, ``mesh`` and, as ``node_ids``, the numbers of the nodes in the mesh; in 3D also with
-        ``areas``. Its ``notes``, a tuple of sentences, say what may not have been intended: nodes of a pair that face
-        nothing, for example, have no contact.
+        With ``coordinates``, ``mesh`` and, as ``node_ids``, the numbers of the nodes in the mesh, or those that they
+        have in a deck; in 3D also with ``areas``. Its ``notes``, a tuple of sentences, say what may not
+        have been intended: nodes of a pair that face nothing, for example, have no contact.
 
     Raises
     ------
@@ -448,13 +451,13 @@ def _of_file(path: object, made: Callable[[Scene], T]) -> T:
     place = file_path(path, "path")
     try:
         options = _toml(place)
-        name = file_path(options.pop("mesh", None), "mesh", "the name of a mesh file in quotes")
+        given = in_folder(options.pop("mesh", None), place.parent)
         options.pop("steps", None)  # of enumsol history
         checked_units(options.pop("units", None))
         text_of(options.pop("title", ""), "title")
         check_keys(options, also=(_PAIRS,))
         written = "{0}.{1} = {2}".format, "{0} = {2}".format
-        source = refuse_old_friction(place.parent / name, options, lambda *said: written[not said[1]](*said))
+        source = refuse_old_friction(given, options, lambda *said: written[not said[1]](*said))
         return made(mesh_scene(source, **options))
     except (InvalidArgumentError, InvalidProblemError) as error:
         raise InvalidProblemError(f"{place}: {error}") from error
