@@ -313,6 +313,12 @@ class Deck:
         """Number of a node in the deck, behind the name of its instance if it has one."""
         return self._name(row, self.node_labels, 0)
 
+    def node_names(self) -> list[int] | list[str]:
+        """Names of all nodes, as `node_name` gives them; numbers if there are no instances."""
+        if len(self.instances) <= 1:
+            return [int(label) for label in self.node_labels]
+        return [self.node_name(row) for row in range(len(self.node_labels))]
+
     def element_name(self, row: int) -> str:
         """Number of an element in the deck, behind the name of its instance if it has one."""
         return self._name(row, self.element_labels, 2)

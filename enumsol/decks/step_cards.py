@@ -6,7 +6,7 @@ from itertools import pairwise
 from typing import TYPE_CHECKING
 
 from enumsol.decks.cards import is_number, key
-from enumsol.decks.registry import card
+from enumsol.decks.registry import card, harmless
 from enumsol.decks.steps import Act, Amplitude, DeckStep
 
 if TYPE_CHECKING:
@@ -32,6 +32,16 @@ VOLUME = ("BX", "BY", "BZ")
 _OTHER = ("SUBMODEL", "USER", "MASS FLOW", "BASE NAME", "FIXED", "SECTOR", "FILE", "BSTEP", "TIME DELAY", "LOAD CASE")
 #: What each kind of act is.
 _WORDS = {"BOUNDARY": "displacements", "CLOAD": "forces", "DLOAD": "loads", "TEMPERATURE": "temperatures"}
+
+
+harmless("all equilibria at the end of a step are found, without increments", *(
+    "CONTROLS", "CONTACT CONTROLS", "SOLVER CONTROLS", "TIME POINTS", "NO ANALYSIS", "ANALYSIS CONTROLS",
+))  # fmt: skip
+harmless("it asks for output", "FILTER")
+harmless("the analysis is static", "DAMPING", "GLOBAL DAMPING", "MODAL DAMPING")
+harmless("no heat is conducted", *(
+    "CONDUCTIVITY", "SPECIFIC HEAT", "LATENT HEAT", "PHYSICAL CONSTANTS", "GAP CONDUCTANCE", "GAP HEAT GENERATION",
+))  # fmt: skip
 
 
 @card("STEP", "NAME", "NLGEOM", "INC", "PERTURBATION", "AMPLITUDE", "UNSYMM", "SOLVER", "CONVERT SDI", "EXTRAPOLATION")

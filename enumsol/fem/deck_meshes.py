@@ -13,7 +13,7 @@ from enumsol.support.messages import counted
 
 if TYPE_CHECKING:
     from enumsol.decks.model import Deck, ElementBlock
-    from enumsol.support.array_types import Floats, Integers, Mask
+    from enumsol.support.array_types import Floats, Integers, Mask, NDArray
 
 #: Sections whose elements carry something.
 _CARRYING = ("SOLID SECTION", "SHELL SECTION", "MEMBRANE SECTION", "BEAM SECTION")
@@ -25,11 +25,11 @@ _WRITTEN_BY_SHAPE = "written by meshio"
 
 @dataclass(frozen=True, eq=False)
 class CellBlock:
-    """Cells of one kind: its name as meshio has it, nodes (m, k) in the order of VTK, and numbers in the deck."""
+    """Cells of one kind: its name as meshio has it, nodes (m, k) in the order of VTK, and names in the deck."""
 
     type: str
     data: Integers
-    labels: Integers
+    labels: NDArray[Any]
 
 
 @dataclass(eq=False)
@@ -45,6 +45,8 @@ class DeckMesh:
     cell_sets : dict of names to lists of rows of cells, by blocks
     types : list of str
         Of the elements of bodies.
+    node_labels : list of int or str
+        Numbers of the nodes in the deck, behind the names of instances.
     """
 
     points: Floats
@@ -52,11 +54,12 @@ class DeckMesh:
     point_sets: dict[str, Integers] = field(default_factory=dict)
     cell_sets: dict[str, list[Integers]] = field(default_factory=dict)
     types: list[str] = field(default_factory=list)
+    node_labels: list[int] | list[str] = field(default_factory=list)
     point_data: dict[str, Any] = field(default_factory=dict)
     cell_data: dict[str, Any] = field(default_factory=dict)
     field_data: dict[str, Any] = field(default_factory=dict)
 
-    def add(self, kind: str, data: Integers, labels: Integers, names: dict[str, Integers]) -> None:
+    def add(self, kind: str, data: Integers, labels: NDArray[Any], names: dict[str, Integers]) -> None:
         """Add a block of cells, and which of its rows belong to which sets."""
         self.cells.append(CellBlock(kind, data, labels))
         for name, rows in names.items():
@@ -64,8 +67,8 @@ class DeckMesh:
             own += [np.zeros(0, dtype=np.int64)] * (len(self.cells) - 1 - len(own))
             own.append(rows)
 
-    def labels(self, kinds: list[str]) -> Integers:
-        """Numbers of all cells of some kinds."""
+    def labels(self, kinds: list[str]) -> NDArray[Any]:
+        """Names of all cells of some kinds in the deck: numbers, behind those of instances if there are any."""
         return np.concatenate([block.labels for block in self.cells if block.type in kinds])
 
     def closed(self) -> DeckMesh:
@@ -95,7 +98,7 @@ def deck_mesh(deck: Deck, *, spelled: bool = False) -> DeckMesh:
     bodies, shapes = _bodies(deck)
     types = () if shapes else dict.fromkeys(deck.blocks[k].type.name for k in bodies)
     of = deck.spelled if spelled else {}
-    made = DeckMesh(deck.points, types=list(types))
+    made = DeckMesh(deck.points, types=list(types), node_labels=deck.node_names())
     firsts = np.cumsum([0, *(len(block.labels) for block in deck.blocks)])
     for k in bodies:
         _add_body(made, deck, k, int(firsts[k]), of)
@@ -167,7 +170,10 @@ def _add_body(made: DeckMesh, deck: Deck, k: int, first: int, of: dict[str, str]
         if len(own):
             sets[of.get(name, name)] = own
     shape = block.type.shape
-    made.add(shape.name, block.nodes[:, shape.to_vtk] if shape.to_vtk else block.nodes, block.labels, sets)
+    labels = block.labels
+    if len(deck.instances) > 1:
+        labels = np.array([deck.element_name(first + row) for row in range(len(labels))])
+    made.add(shape.name, block.nodes[:, shape.to_vtk] if shape.to_vtk else block.nodes, labels, sets)
 
 
 def _check_carrier(deck: Deck, block: ElementBlock, first: int, dimension: int, covered: Mask) -> None:

@@ -212,13 +212,12 @@ def acting(deck: Deck, parts: DeckParts, state: DeckState, joints: DeckJoints) -
 def _on_nodes(
     deck: Deck, parts: DeckParts, state: DeckState, joints: DeckJoints, kind: str
 ) -> tuple[dict[str, list[Any]], dict[str, dict[int, float]]]:
-    """Displacements or forces by sets of nodes, nodes for which the same lines give the same; and of reference points.
+    """Displacements or forces by sets of nodes to which a line gives the same; and of reference points.
 
     The first by components, the second by entries, of which rotations are the last.
     """
     dimension, free = joints.dimension, None if kind == "BOUNDARY" else 0.0
-    of_node: dict[int, dict[int, float]] = {}
-    by: dict[int, list[DeckPlace]] = {}
+    of_lines: dict[DeckPlace, dict[int, dict[int, float]]] = {}
     points: dict[str, dict[int, float]] = {}
     for (node, component), value in state.of(kind).items():
         row, number = int(node), int(component)
@@ -235,19 +234,20 @@ def _on_nodes(
         elif slot is not None:
             points.setdefault(slot[0], {})[entry] = value
         else:
-            of_node.setdefault(row, {})[number] = value
-            by.setdefault(row, []).append(place)
-    parts.told_of_loose(np.array(list(of_node), dtype=np.int64), kind, by)
-    groups: dict[Any, list[int]] = {}
-    for row, own in of_node.items():
-        groups.setdefault((tuple(sorted(set(by[row]))), tuple(sorted(own.items()))), []).append(row)
-    found = {}
-    for (places, own), nodes in groups.items():
-        rows = parts.in_bodies(np.array(nodes))
-        if len(rows):
-            given = dict(own)
-            name = parts.nodes(rows, _wanted(deck, rows, f"{kind.lower()} of line {places[0].line}"))
-            found[name] = [given.get(k, free) for k in range(1, dimension + 1)]
+            of_lines.setdefault(place, {}).setdefault(row, {})[entry] = value
+    found: dict[str, list[Any]] = {}
+    for place, nodes in of_lines.items():
+        parts.told_of_loose(np.array(list(nodes)), kind, place)
+        groups: dict[Any, list[int]] = {}
+        for row, own in nodes.items():
+            groups.setdefault(tuple(sorted(own.items())), []).append(row)
+        for given, rows in groups.items():
+            inside = parts.in_bodies(np.array(rows))
+            if len(inside):
+                wanted = _wanted(deck, inside, f"{kind.lower()} of line {place.line}")
+                name = parts.nodes(inside, wanted) if kind == "BOUNDARY" else parts.exactly(inside, wanted)
+                for k, value in given:
+                    found.setdefault(name, [free] * dimension)[k] = value
     return found, points
 
 

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from functools import cached_property
+from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -13,7 +15,6 @@ from enumsol.fem.mesh_files import mesh_of_deck
 from enumsol.support.messages import counted
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable
 
     from enumsol.decks.cards import DeckPlace
     from enumsol.decks.model import Deck
@@ -28,6 +29,7 @@ class DeckParts:
     def __init__(self, deck: Deck) -> None:
         self._deck = deck
         self._names: dict[tuple[str, bytes], str] = {}
+        self._exact: dict[str, Integers] = {}
         self._taken = {*deck.node_sets, *deck.element_sets, *deck.surfaces}
 
     def nodes(self, rows: Integers, wanted: str) -> str:
@@ -65,10 +67,17 @@ class DeckParts:
 
     def in_bodies(self, rows: Integers) -> Integers:
         """Nodes among these that belong to bodies."""
-        own = [block.nodes.ravel() for block in self._deck.blocks if block.type.is_body]
-        return rows[np.isin(rows, np.concatenate(own))] if own else rows[:0]
+        return rows[np.isin(rows, self._used)]
 
-    def told_of_loose(self, rows: Integers, kind: str, places: dict[int, list[DeckPlace]]) -> None:
+    def exactly(self, rows: Integers, wanted: str) -> str:
+        """Name of a set of these nodes alone, without nodes that elements of 20 nodes get in the middle of facets."""
+        if not any(block.type.shape.nodes == 20 for block in self._deck.blocks):
+            return self.nodes(rows, wanted)
+        name = f"{wanted} (nodes)"
+        self._exact[name] = np.unique(rows)
+        return name
+
+    def told_of_loose(self, rows: Integers, kind: str, place: DeckPlace) -> None:
         """Refuse forces on nodes of no body, and account for supports of such.
 
         Raises
@@ -76,31 +85,29 @@ class DeckParts:
         InvalidArgumentError
             A force acts on one.
         """
-        loose = np.setdiff1d(rows, self.in_bodies(rows)).tolist()
-        if loose and kind == "CLOAD":
+        loose = np.setdiff1d(rows, self.in_bodies(rows))
+        if not len(loose):
+            return
+        if kind == "CLOAD":
             raise InvalidArgumentError(
-                f"{places[loose[0]][0]}: *CLOAD loads node {self._deck.node_name(loose[0])}, which belongs to no body "
-                "and to no coupling; expected nodes of bodies, or reference nodes"
+                f"{place}: *CLOAD loads node {self._deck.node_name(int(loose[0]))}, which belongs to no body and to no "
+                "coupling; expected nodes of bodies, or reference nodes"
             )
-        for place in sorted({places[row][0] for row in loose}):
-            count = sum(places[row][0] == place for row in loose)
-            entry = Account(place, kind, f"{counted(count, 'node')} of no body not used", used=False)
-            if entry not in self._deck.account:
-                self._deck.account.append(entry)
+        entry = Account(place, kind, f"{counted(len(loose), 'node')} of no body not used", used=False)
+        if entry not in self._deck.account:
+            self._deck.account.append(entry)
 
     def mesh(self) -> PartedMesh:
         """Mesh of the deck with all of these."""
-        return mesh_of_deck(self._deck)
+        mesh = mesh_of_deck(self._deck)
+        exact = {name: np.searchsorted(self._used, rows) for name, rows in self._exact.items()}
+        return replace(mesh, node_sets=MappingProxyType({**mesh.node_sets, **exact})) if exact else mesh
 
-    def node_names(self, mesh_nodes: Iterable[int]) -> list[str | int]:
-        """Numbers in the deck of nodes of its mesh, behind the names of their instances if there are any.
-
-        Nodes in the middle of facets, which elements of 20 nodes do not have, are called so.
-        """
+    @cached_property
+    def _used(self) -> Integers:
+        """Rows of the nodes of bodies, in the order in which its mesh has them."""
         own = [block.nodes.ravel() for block in self._deck.blocks if block.type.is_body]
-        used = np.unique(np.concatenate(own))
-        names = [self._deck.node_name(used[node]) if node < len(used) else f"centre-{node}" for node in mesh_nodes]
-        return [int(name) if name.isdigit() else name for name in names]
+        return np.unique(np.concatenate([np.zeros(0, dtype=np.int64), *own]))
 
     def adjusted(self, scene: Scene) -> PartedMesh | None:
         """Mesh whose contact nodes are moved onto what they face where the deck says so; None if it moves none."""

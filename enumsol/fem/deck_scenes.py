@@ -21,7 +21,6 @@ from enumsol.fem.deck_options import acting, friction, is_plane, shared
 from enumsol.fem.deck_parts import DeckParts
 from enumsol.fem.mesh_problems import mesh_scene
 from enumsol.loading.steps import LoadStep
-from enumsol.model.restart import afresh
 from enumsol.support.arguments import file_path, positive_integer
 from enumsol.support.messages import counted
 
@@ -161,10 +160,9 @@ class DeckModel:
         """
         scene = self.scene(step)
         try:
-            problem = scene.problem()
+            return scene.problem()
         except (InvalidArgumentError, InvalidProblemError) as error:
             raise InvalidProblemError(f"{self.deck.path}: {error}") from error
-        return afresh(problem, node_ids=tuple(self._parts.node_names(problem.node_ids)))
 
     def steps(self) -> list[LoadStep]:
         """Steps for `histories`, on the problem of any step.

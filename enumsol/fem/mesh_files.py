@@ -21,7 +21,7 @@ from enumsol.fem.cell_blocks import as_cells_have, joined
 from enumsol.fem.deck_meshes import DeckMesh, deck_mesh
 from enumsol.fem.file_counts import refuse_partial
 from enumsol.fem.meshes import ALL, SAME, PartedMesh, SolidMesh, positions
-from enumsol.model.cells import KINDS, boundary_facets, numbers_of_nodes, padded
+from enumsol.model.cells import KINDS, boundary_facets, by_kind, numbers_of_nodes, padded
 from enumsol.support.arguments import file_path, shown
 from enumsol.support.array_types import Floats, Integers, NDArray
 from enumsol.support.files import DAMAGE, unreadable
@@ -216,6 +216,10 @@ def _parted(mesh: meshio.Mesh | DeckMesh, groups: str | None, dimension: int | N
         facets = {name: as_cells_have(rows, inside, name) for name, rows in facets.items()}
     found, sets = facets_of_sets(dimension, inside, sets, int(np.sum(of_file >= 0)))
     facets = {**found, **facets} if isinstance(mesh, DeckMesh) else facets or found
+    if not facets and isinstance(mesh, DeckMesh):
+        raise InvalidArgumentError(
+            "the deck names no part of its boundary; expected *SURFACE, or *NSET with all nodes of a facet"
+        )
     if not facets:
         raise InvalidArgumentError(
             f"the mesh has no contact facets: no {' or '.join(sides)} cells on its boundary; "
@@ -225,7 +229,22 @@ def _parted(mesh: meshio.Mesh | DeckMesh, groups: str | None, dimension: int | N
     made = PartedMesh if dimension == 2 else SolidMesh
     named = _grouped(mesh, bodies, groups, dimension)
     parts, others, bodies_of = (MappingProxyType(each) for each in (facets, sets, named))
-    return made(nodes, inside, parts, others, bodies_of, labels, types)
+    named_nodes = _node_labels(mesh, of_file, inside) if isinstance(mesh, DeckMesh) else None
+    return made(nodes, inside, parts, others, bodies_of, labels, types, named_nodes)
+
+
+def _node_labels(mesh: DeckMesh, of_file: Integers, cells: Integers) -> tuple[int | str, ...]:
+    """Names of nodes in a deck; those of completed cells, rows -1 of the file, by the nodes at the corners around."""
+    names: list[int | str] = [mesh.node_labels[row] if row >= 0 else "" for row in of_file.tolist()]
+    for _, nodes in by_kind(3, cells) if np.any(of_file < 0) else ():
+        kind = KINDS[3, nodes.shape[1]]
+        around_nodes = [(int(side[8]), side[:4]) for side in kind.sides if len(side) == 9]
+        if kind.form == "hexahedron":
+            around_nodes.append((-1, np.arange(kind.corners)))
+        for inner, around in around_nodes:
+            for row in np.flatnonzero(of_file[nodes[:, inner]] < 0):
+                names[nodes[row, inner]] = "/".join(str(names[node]) for node in nodes[row, around])
+    return tuple(names)
 
 
 def _plane(points: NDArray[Any]) -> Floats:

@@ -318,9 +318,9 @@ def mesh_problem(
     Returns
     -------
     ContactProblem or ContactProblem3D
-        With ``coordinates``, ``mesh`` and, as ``node_ids``, the numbers of the nodes in the mesh; in 3D also with
-        ``areas``. Its ``notes``, a tuple of sentences, say what may not have been intended: nodes of a pair that face
-        nothing, for example, have no contact.
+        With ``coordinates``, ``mesh`` and, as ``node_ids``, the numbers of the nodes in the mesh, or those that they
+        have in a deck; in 3D also with ``areas``. Its ``notes``, a tuple of sentences, say what may not
+        have been intended: nodes of a pair that face nothing, for example, have no contact.
 
     Raises
     ------

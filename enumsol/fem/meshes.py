@@ -51,8 +51,11 @@ class PartedMesh:
         Nodes of parts that are given by nodes.
     bodies : mapping of names to (k,) int arrays
         Rows of the cells of named parts of the body: materials, or several bodies.
-    labels : (M,) int array or None
-        Numbers of the cells in the file that they are from, where it gives such.
+    labels : (M,) array or None
+        Numbers of the cells in the file that they are from, where it gives such; of instances of parts, text.
+    node_labels : tuple of N int or str, or None
+        Names of the nodes in the file that they are from, where it gives such. Those that are not in the file are named
+        by nodes around them, as in "1/2/6/5".
     types : tuple of str
         What the file calls the elements that the cells are, as in Abaqus; they stand for a formulation.
     """
@@ -64,6 +67,15 @@ class PartedMesh:
     bodies: Mapping[str, Integers] = field(default_factory=lambda: MappingProxyType({}))
     labels: Integers | None = None
     types: tuple[str, ...] = ()
+    node_labels: tuple[int | str, ...] | None = None
+
+    def node_names(self, rows: Integers) -> list[int] | list[str]:
+        """Names of nodes in the file that the mesh is from, all numbers or all text; or else their rows."""
+        if self.node_labels is None:
+            return [int(row) for row in rows]
+        names = [self.node_labels[row] for row in rows]
+        numbers = [name for name in names if isinstance(name, int)]
+        return numbers if len(numbers) == len(names) else [str(name) for name in names]
 
     def body(self, name: str) -> Integers:
         """Rows of the cells of this name.
@@ -141,7 +153,7 @@ class SolidMesh(PartedMesh):
         Nodes of each tetrahedron (k = 4 or 10) or hexahedron (k = 8 or 27), in the order of VTK.
     facets : mapping of names to (k, m) int arrays
         Nodes of the triangles (m = 3 or 6) or quadrilaterals (m = 4 or 9) of parts of the boundary.
-    node_sets, bodies, labels, types
+    node_sets, bodies, labels, types, node_labels
         As in `PartedMesh`.
     """
 

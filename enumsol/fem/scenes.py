@@ -214,7 +214,7 @@ class Scene:
             mass=self._mass(),
             mesh=lambda motion, moved: BodyMesh(mesh.points, mesh.cells, motion, moved, surface, lame=self.lame),
             gap=gaps,
-            node_ids=nodes.nodes.tolist(),
+            node_ids=mesh.node_names(nodes.nodes),
             coordinates=mesh.points[nodes.nodes],
             max_rigid_displacement=bound,
             **coefficients,

@@ -343,7 +343,7 @@ class RootForm:
         Parameters
         ----------
         cost : (m,) array, not negative
-        least, left : as of a Confinement
+        least, left : as of a ForceBound (theory, section 14.15)
         farthest : float
         """
         steep, pushed = self._slopes(Ball.exact(np.diag(cost)[cost > 0]))

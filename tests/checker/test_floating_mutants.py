@@ -31,6 +31,7 @@ from enumsol.condensation.enclosure import enclosure_of
 from enumsol.condensation.space_condensed import EnclosedSpace
 from enumsol.model import sectors
 from enumsol.model.sectors import SECTORS, nearest
+from enumsol.search.solvers import Solvers
 from enumsol.trusted.exclusion import exclusion_margin
 from enumsol.trusted.space import sector_rows as sr
 from enumsol.trusted.space.resultants import is_unbalanced_in_space
@@ -334,3 +335,25 @@ def _inside(known, node, code):
     tau = known.lambda_t[node] / np.array(known.problem.friction).T[node]
     (x, y), (p, q) = sectors.direction(code - SECTORS), sectors.direction(sectors.end_number(code - SECTORS))
     return x * tau[1] - y * tau[0] > 0 and tau[0] * q - tau[1] * p > 0
+
+
+@pytest.mark.parametrize("seed", [340, 376, 592])
+def test_roots_that_selections_share_are_judged_by_all_of_them(seed, monkeypatch):
+    """Where rationals are not to be had, a root between stick and slip is a leaf "g"."""
+    monkeypatch.setattr(Solvers, "exact_certifier", None)
+    problem = random_body(seed)
+    roots = enumsol.enumerate_roots(problem, 0)
+    records = records_of(roots.proof)
+    leaves = of_kind(records, "g")
+    assert len(leaves) == 2
+    assert check_records(problem, records)["roots"] == len(roots)
+    node, code = records[leaves[0]][1][0]
+    for place, value in ((1, [[node, 5 - code]]), (1, [[node, 1]]), (1, []), (4, -records[leaves[0]][4])):
+        forged = put(records, (leaves[0], place), value)
+        with pytest.raises(Refused):
+            check_records(problem, forged)
+        assert why_refused(problem, forged)
+    mid = records[leaves[0]][2]
+    moved = put(records, (leaves[0], 2), [mid[0] + 1.0, *mid[1:]])
+    with pytest.raises(Refused, match="misses"):
+        check_records(problem, moved)

@@ -28,7 +28,7 @@ IN_SPACE = {
     *("enumsol.checker.space_checker", "enumsol.condensation.space_condensed", "enumsol.model.sectors"),
     *inside("trusted.space", "resultants", "sector_margins", "sector_rows", "leaves", "boxed_solution"),
     *inside("trusted.space", "natural_map", "krawczyk", "space_uniqueness", "turning"),
-    *inside("trusted.space", "leaf_conditions", "leaf_equations", "confinement"),
+    *inside("trusted.space", "leaf_conditions", "leaf_equations", "force_bound"),
 }
 #: The search: its rooms, and what it alone uses of rooms that it shares with the checkers.
 SEARCH = (

@@ -23,6 +23,10 @@ SHELL = "*SHELL SECTION, ELSET=FLOOR, MATERIAL=M\n0.1\n"
 SECTION = "*SOLID SECTION, ELSET=VOLUME1, MATERIAL=M\n"
 
 
+#: Faces of a hexahedron in the manual.
+FACES = ["1234", "5876", "1562", "2673", "3784", "4851"]
+
+
 def mesh_of(folder, text):
     return fem.read_mesh(written(folder, text))
 
@@ -149,3 +153,36 @@ def test_notes_on_other_formulations(tmp_path):
     assert note.startswith("elements of type C3D8I are taken as C3D8, with full integration and without incompatible")
     plain = fem.mesh_scene(written(tmp_path, text.replace("C3D8I", "C3D8")), **given)
     assert not any("C3D8" in note for note in plain.notes)
+
+
+def test_nodes_and_elements_have_the_names_of_the_deck(tmp_path):
+    """In problems and in messages; in front of the numbers of an instance stands its name."""
+    square = "*NODE\n11,0,0\n12,1,0\n7,1,1\n9,0,1\n*ELEMENT,TYPE=CPE4,ELSET=B\n3,11,12,7,9\n"
+    given = {"young": 1, "poisson": 0, "plane": "strain"}
+    sets = "*NSET,NSET=LOW\n11,12\n*NSET,NSET=HIGH\n7,9\n"
+    problem = fem.mesh_problem(written(tmp_path, square + sets), **given, contact="LOW", clamp="HIGH")
+    assert problem.node_ids == (11, 12)
+    text = f"*PART,NAME=P\n{square}{sets}*END PART\n*INSTANCE,NAME=A,PART=P\n*END INSTANCE\n"
+    text += "*INSTANCE,NAME=B-1,PART=P\n0,2\n*END INSTANCE\n"
+    clamps = {"contact": ["A.LOW", "B-1.LOW"], "clamp": ["A.HIGH", "B-1.HIGH"]}
+    problem = fem.mesh_problem(written(tmp_path, text), **given, **clamps)
+    assert problem.node_ids == ("A.11", "A.12", "B-1.11", "B-1.12")
+    folded = text.replace("\n7,1,1", "\n7,.1,.1")
+    bad_argument("element A.3 is flat, folded", fem.mesh_problem, written(tmp_path, folded), **given, **clamps)
+
+
+def test_nodes_of_completed_hexahedra_are_named_by_the_corners_around(tmp_path):
+    body = solid((1, 1, 1), 20)
+    nodes = "".join(f"{5 + k},{x!r},{y!r},{z!r}\n" for k, (x, y, z) in enumerate(body.points.tolist()))
+    row = [str(5 + node) for node in body.cells[0]]
+    text = f"*NODE\n{nodes}*ELEMENT,TYPE=C3D20,ELSET=B\n1,{','.join(row[:9])},\n{','.join(row[9:])}\n"
+    mesh = mesh_of(tmp_path, text + "*SURFACE,NAME=LOW\nB,S1\n*SURFACE,NAME=HIGH\nB,S2\n")
+    corners = {tuple(5 + node for node in body.cells[0][[int(digit) - 1 for digit in face]]) for face in FACES}
+    assert {tuple(sorted(map(int, name.split("/")))) for name in mesh.node_labels[20:26]} == {
+        tuple(sorted(map(int, face))) for face in corners
+    }
+    assert mesh.node_labels[:20] == tuple(range(5, 25))
+    assert len(set(mesh.node_labels)) == 27
+    problem = fem.mesh_problem(mesh, young=1, poisson=0, contact="LOW", clamp="HIGH")
+    assert len(problem.node_ids) == 9
+    assert all(isinstance(name, str) for name in problem.node_ids)

@@ -1,12 +1,16 @@
 """Decks with one card more or less, against the same problem described by hand, and in one sentence where it cannot be."""
 # ruff: noqa: E501 (tables of decks)
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 from small_decks import CONTACT, HELD, MATERIALS, MESH, PRESSED, assert_same, by_hand, deck, step
 
 import enumsol
+from enumsol import fem
 
+DECKS = Path(__file__).parents[1] / "decks"
 SIDE = {"SIDE": (0.0, None)}
 TOP = {"TOP": (None, -0.01)}
 DOWN = "*BOUNDARY\nTOP, 2, 2, -0.01\n"
@@ -248,3 +252,71 @@ def test_of_several_steps_one_is_named(read):
         model.problem(3)
     assert_same(model.problem(2), by_hand(pressure={"RIGHT": 4.0}))
     assert model.step_count == 2
+
+
+# -- bodies in 3D ------------------------------------------------------------------------------------------------------
+
+
+def cube(first_node, element, z):
+    """A brick of 20 nodes at a height, as lines of *NODE and *ELEMENT."""
+    corners = [(0, 0, 0), (1, 0, 0), (1, 1, 0), (0, 1, 0), (0, 0, 1), (1, 0, 1), (1, 1, 1), (0, 1, 1)]
+    ends = [(0, 1), (1, 2), (2, 3), (3, 0), (4, 5), (5, 6), (6, 7), (7, 4), (0, 4), (1, 5), (2, 6), (3, 7)]
+    points = np.array([*corners, *(np.mean([corners[a], corners[b]], axis=0) for a, b in ends)]) + np.array([0, 0, z])
+    numbers = [first_node + k for k in range(20)]
+    nodes = "".join(f"{n}, {x}, {y}, {w}\n" for n, (x, y, w) in zip(numbers, points.tolist(), strict=True))
+    first, rest = ", ".join(map(str, numbers[:14])), ", ".join(map(str, numbers[14:]))
+    return nodes, f"{element}, {first},\n{rest}\n", dict(zip(numbers, points.tolist(), strict=True))
+
+
+def test_bricks_of_20_nodes_are_held_and_loaded_at_the_nodes_that_the_deck_names(read):
+    lower, upper = cube(1, 1, 0.0), cube(101, 2, 1.0)
+    places = {**lower[2], **upper[2]}
+
+    def those(condition):
+        return "\n".join(str(n) for n, place in places.items() if condition(n, *place)) + "\n"
+
+    text = (
+        f"*NODE\n{lower[0]}{upper[0]}*ELEMENT, TYPE=C3D20, ELSET=BODY\n{lower[1]}{upper[1]}"
+        f"*NSET, NSET=BOTTOM\n{those(lambda n, x, y, z: z == 0)}*NSET, NSET=LEFT\n{those(lambda n, x, y, z: n > 100 and x == 0)}"
+        f"*NSET, NSET=FRONT\n{those(lambda n, x, y, z: n > 100 and y == 0)}*NSET, NSET=TOP\n{those(lambda n, x, y, z: z == 2)}"
+        "*SURFACE, NAME=UNDER\n2, S1\n*SURFACE, NAME=ON\n1, S2\n"
+        "*MATERIAL, NAME=M\n*ELASTIC\n100., 0.3\n*SOLID SECTION, ELSET=BODY, MATERIAL=M\n"
+        + CONTACT
+        + "*BOUNDARY\nBOTTOM, 1, 3\nLEFT, 1\nFRONT, 2\nTOP, 3\n"
+        + step("*BOUNDARY\nTOP, 3, 3, -0.01\n*CLOAD\nLEFT, 2, 0.5\nTOP, 1, 0.25\n")
+    )
+    model = read(text)
+    scene = model.scene()
+    fixed, points = scene.held.fixed, scene.mesh.points
+    # the nodes in the middle of facets, which the deck cannot name, are held as those around them
+    assert len(points) == 40 + 13 + 1
+    for axis, near in enumerate((points[:, 0] == 0, points[:, 1] == 0)):
+        assert np.all(fixed[near & (points[:, 2] > 1), axis])
+    assert np.all(fixed[points[:, 2] == 2, 2])
+    assert np.all(fixed[points[:, 2] == 0])
+    # forces act on the 8 nodes that it names
+    np.testing.assert_allclose(scene.forces.sum(axis=0), [8 * 0.25, 8 * 0.5, 0])
+    assert np.count_nonzero(np.any(scene.forces, axis=1)) == 13
+    problem = model.problem()
+    roots = enumsol.enumerate_roots(problem, 0)
+    assert roots.complete
+    assert {node for node in problem.node_ids if isinstance(node, int)} <= set(range(101, 121))
+
+
+def test_a_deck_of_parts_and_instances():
+    model = enumsol.read_deck(DECKS / "instances.inp")
+    problem = model.problem()
+    assert problem.node_ids == tuple(f"BLOCK-2.{k}" for k in (1, 2, 3, 4))
+    box = fem.box(1, 1, 1)
+    points = np.concatenate([box.points, box.points + np.array([0, 0, 1])])
+    facets = {"under": box.facets["bottom"] + 8, "on": box.facets["top"], "above": box.facets["top"] + 8}
+    mesh = fem.SolidMesh(points, np.concatenate([box.cells, box.cells + 8]), {**facets, "foot": box.facets["bottom"]})
+    other = fem.mesh_problem(
+        mesh, young=210000, poisson=0.3, pairs=[("under", "on")], friction=0.2, clamp="foot",
+        displacement={"above": (0.001, 0, -0.001)}, pressure={"above": 10.0},
+    )  # fmt: skip
+    one, two = (enumsol.enumerate_roots(body, 0) for body in (problem, other))
+    assert (one.complete, len(one)) == (two.complete, len(two)) == (True, 1)
+    order = [int(np.argmin(np.linalg.norm(other.coordinates - place, axis=1))) for place in problem.coordinates]
+    np.testing.assert_allclose(one[0].lambda_n, two[0].lambda_n[order], rtol=1e-9)
+    np.testing.assert_allclose(problem.areas, other.areas[order])

@@ -319,7 +319,7 @@ class FloatingPoint(Point):
         self.references = References(self.forms, self.friction, self.scale)
 
     def leaf(self, codes, kind, *rest):
-        need(kind in ("x", "n", "r", "D", "u", "i", "o"), "an unknown leaf")
+        need(kind in ("x", "n", "r", "D", "u", "i", "o", "g"), "an unknown leaf")
         if kind == "o":
             back, rows, pairs, *claim = rest
             selection = self.references.leaf(codes, back, rows, pairs, claimed=bool(claim))
@@ -328,11 +328,39 @@ class FloatingPoint(Point):
         elif kind == "x":
             need(len(rest) == 2, "an exclusion that rests on a definite stiffness")
             super().leaf(codes, kind, *rest)
+        elif kind == "g":
+            self.shared(codes, *rest)
         elif kind == "i":
             (z,) = rest
             need(self.forms.unbalanced(codes, z, self.scale[0]), "forces of a leaf may be in balance with the load")
         else:
             super().leaf(codes, kind, *rest)
+
+    def shared(self, codes, slips, mid, rad, index):
+        """[6.4] A root that selections share: all of them are tried."""
+        nodes = [integer(node) for node, _ in slips]
+        need(0 < len(nodes) <= 8 and nodes == sorted(set(nodes)), "no nodes, or too many, or not ascending")
+        for node, code in slips:
+            need(0 <= node < self.p and self.friction[node], "a node that cannot slip")
+            need(integer(code) in (2, 3) and codes[node] in (1, code), "a node that slips otherwise")
+        points, signs, holding = set(), set(), []
+        for chosen in product(*((1, code) for _, code in slips)):
+            between = dict(zip(nodes, chosen, strict=True))
+            selection = tuple(between.get(i, code) for i, code in enumerate(codes))
+            equations = self.forms.equations(selection)
+            N = fmpq_mat([form[:-1] for form in equations])
+            need(N.det() != 0, "a selection is singular")
+            solution = N.solve(column_of([-form[-1] for form in equations])).entries()
+            need(len(mid) == len(rad) == 2 * self.p, "an enclosure has another size")
+            for x, m, r in zip(solution[: 2 * self.p], map(exact, mid), map(exact, rad), strict=True):
+                need(abs(x - m) <= r, "an enclosure misses a solution")
+            signs.add((1 if N.det() > 0 else -1) * (-1) ** (len(solution) - 2 * self.p))
+            found = self.forms.hull(selection)
+            points.update(tuple(point) for point in found)
+            holding += [selection] if found else []
+        need(len(points) == 1, "the selections do not share one root")
+        need(signs == {integer(index)}, "an index is wrong")
+        self.polytopes.append((holding[0], 0))
 
     def declare(self, selection, weights, more):
         self.references.declare(selection, weights, *more)

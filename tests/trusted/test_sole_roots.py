@@ -15,7 +15,7 @@ from space_judge import judge_records
 
 import enumsol
 from enumsol.search.space.sole_roots import sole_turns
-from enumsol.trusted.space.confinement import Confinement
+from enumsol.trusted.space.force_bound import ForceBound
 
 
 def scaled(reference, force, tau, w):
@@ -62,7 +62,7 @@ def tried(seed):
         turns = turns_of(rng, system)
         weights = reference._turning(turns)
         root = reference.root.y, reference.root.w
-        within = Confinement.of((reference.form.S, reference.form.G), weights.multipliers(system), root, reach)
+        within = ForceBound.of((reference.form.S, reference.form.G), weights.multipliers(system), root, reach)
         counts["bounds"] += within is not None
         for d, _ in found if within is not None else []:
             counts["inside"] += 1

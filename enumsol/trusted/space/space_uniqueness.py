@@ -15,7 +15,7 @@ import numpy as np
 
 from enumsol.arithmetic.balls import SAFE, TINY, UNIT, Ball, upper_norm
 from enumsol.model.sectors import DEEPEST, SECTORS, is_sector, level_of
-from enumsol.trusted.space.confinement import Confinement
+from enumsol.trusted.space.force_bound import ForceBound
 from enumsol.trusted.space.leaves import SpaceRoot, settle
 from enumsol.trusted.space.sector_rows import (
     ALONG,
@@ -573,13 +573,13 @@ class LeafReference(RootReference[Row]):
             return False
         with np.errstate(all="ignore"):
             body, root = (self.form.S, self.form.G), (self.root.y, self.root.w)
-            within = Confinement.of(body, weights.multipliers(system), root, reach)
+            within = ForceBound.of(body, weights.multipliers(system), root, reach)
             cost = None if within is None else self._costs_of_changes(weights, within)
             if within is None or cost is None:
                 return False
             return self.form.is_sole(cost, within.least, within.left, within.farthest)
 
-    def _costs_of_changes(self, weights: SpaceWeights, within: Confinement) -> Floats | None:
+    def _costs_of_changes(self, weights: SpaceWeights, within: ForceBound) -> Floats | None:
         """Least costs of changes of w, (m,), of a root without slip; None where one may be nothing."""
         cost, system = np.zeros(len(self.system.g)), self.system
         for i, (code, places) in enumerate(zip(self.selection, system.tau, strict=True)):

@@ -22,7 +22,7 @@ _NEAR = 0.5
 
 
 @dataclass(frozen=True)
-class Confinement:
+class ForceBound:
     """The forces of all roots: those of a known one plus centre + T s, with |s| <= reach.
 
     Attributes
