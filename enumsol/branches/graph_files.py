@@ -249,9 +249,13 @@ def _problem_record(problem: AnyProblem) -> dict[str, Any]:
         record["mass"] = _matrix_record(problem.mass)
     if mesh is not None:
         arrays = {name: _listed(getattr(mesh, name)) for name in ("points", "cells", "offset")}
-        more = {} if mesh.lame is None else {"lame": mesh.lame.tolist()}
+        more = {name: own.tolist() for name in _MATERIAL if (own := getattr(mesh, name)) is not None}
         record["mesh"] = arrays | {"motion": _matrix_record(mesh.motion)} | more
     return record
+
+
+#: Arrays of the material of a mesh.
+_MATERIAL = ("lame", "elasticity", "initial_stress")
 
 
 def _listed(array: Floats | None) -> list[Any] | None:
@@ -282,7 +286,13 @@ def _problem(record: dict[str, Any], size: int) -> AnyProblem:
         "coordinates": record["coordinates"],
         "mesh": None
         if (mesh := record.get("mesh")) is None
-        else BodyMesh(mesh["points"], mesh["cells"], matrix(mesh["motion"]), mesh["offset"], lame=mesh.get("lame")),
+        else BodyMesh(
+            mesh["points"],
+            mesh["cells"],
+            matrix(mesh["motion"]),
+            mesh["offset"],
+            **{name: mesh[name] for name in _MATERIAL if name in mesh},
+        ),
         "rigid_modes": record.get("rigid_modes"),
         "max_rigid_displacement": record.get("max_rigid_displacement"),
         "mass": matrix(record["mass"]) if "mass" in record else None,

@@ -92,8 +92,8 @@ def _numbers(text: str, option: str) -> list[Any]:
 
 
 def _plane(text: str, option: str) -> str:
-    if text not in ("strain", "stress"):
-        raise InvalidArgumentError(f"{option} is {text}; expected strain or stress")
+    if text not in ("strain", "stress", "axisymmetric"):
+        raise InvalidArgumentError(f"{option} is {text}; expected strain, stress or axisymmetric")
     return text
 
 
@@ -142,8 +142,10 @@ MESH_OPTIONS = {
     "pairs": Given(_BODY, "NAME:NAME[:GAP]", _pair),
     "young": Given(_BODY, "[NAME=]E", _number),
     "poisson": Given(_BODY, "[NAME=]NU", _number),
-    "plane": Given(_BODY, "[NAME=]strain|stress", _plane),
+    "plane": Given(_BODY, "[NAME=]strain|stress|axisymmetric", _plane),
     "thickness": Given(_BODY, "[NAME=]LENGTH", _number),
+    "expansion": Given(_BODY, "[NAME=]NUMBER", _number),
+    "temperature": Given(_LOAD, "[NAME=]NUMBER", _number),
     "density": Given(_BODY, "[NAME=]DENSITY", _number),
     "friction": Given(_BODY, "[NAME=]F", _number_or_numbers),
     "friction_slope": Given(_BODY, "[NAME=]F", _number_or_numbers),
@@ -224,7 +226,10 @@ def solve(
     pairs : Parts of two bodies that may touch, first the one whose nodes are the contact nodes; may be repeated.
     young : Young's modulus [force / length^2], by parts of the body.
     poisson : Poisson's ratio, by parts of the body.
-    plane : In 2D, plane strain or plane stress; default: strain, but for files of elements of plane stress.
+    plane : In 2D, plane strain, plane stress, or axisymmetric about x = 0; default: strain, or what the elements of a
+        deck are.
+    expansion : Coefficient of thermal expansion, by parts of the body.
+    temperature : Change of temperature, by parts of the body, of nodes or of the boundary.
     thickness : In 2D, thickness; by default all forces are per unit thickness.
     density : Mass per volume, by parts of the body, for --stability; a uniform one need not be given.
     friction : Coefficient of friction, by contact parts (in 3D also F1,F2); without it and --friction-slope it is

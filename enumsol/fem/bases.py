@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import scipy.sparse as sp
@@ -29,6 +29,8 @@ if TYPE_CHECKING:
 FLAT = 1e-14
 #: Quadrature of degree two on triangles, at the nodes between corners: the nodes that can be in contact.
 _BETWEEN = (np.array([[0.5, 0.5, 0.0], [0.0, 0.5, 0.5]]), np.full(3, 1 / 6))
+#: Least degree of quadrature of axisymmetric bodies.
+AXISYMMETRIC_DEGREE = 3
 #: Degree of quadrature on facets: normals of quadratic curved edges.
 _ON_FACETS = 5
 #: Numbers that arrays hold at a time while stiffness is integrated.
@@ -119,12 +121,15 @@ class NodalBasis:
     thickness : (M,) array or None
         Thickness of a plane body, cell by cell; stiffness, tractions and forces per volume are multiplied by it. None
         stands for 1 [length].
+    axisymmetric : bool
+        x is the distance from the axis, and everything is multiplied by the length of the circumference.
     """
 
     blocks: tuple[Block, ...]
     points: Floats
     cells: Integers
     thickness: Floats | None = None
+    axisymmetric: bool = False
 
     @property
     def shape(self) -> tuple[int, int]:
@@ -139,13 +144,15 @@ class NodalBasis:
     @property
     def sizes(self) -> Floats:
         """Areas or volumes of the cells, (M,)."""
-        sizes = np.empty(self.count)
+        sizes, plain = np.empty(self.count), replace(self, thickness=None)
         for block in self.blocks:
-            sizes[block.rows] = np.sum(block.dx, axis=1)
+            sizes[block.rows] = np.sum(plain.weights(block), axis=1)
         return sizes
 
     def weights(self, block: Block) -> Floats:
         """Weights of the points of quadrature of cells, (k, q), by which whatever is integrated is multiplied."""
+        if self.axisymmetric:
+            return np.asarray(2.0 * np.pi * block.places[:, :, 0] * block.dx)
         return block.dx if self.thickness is None else block.dx * self.thickness[block.rows, None]
 
     def strains(self, block: Block, some: slice) -> Floats:
@@ -156,6 +163,8 @@ class NodalBasis:
         for row, (i, j) in enumerate(COMPONENTS[self.components]):
             if j < d:
                 B[:, :, row, :, i] = G[..., j]
+            else:  # around the axis, u_r / r
+                B[:, :, row, :, 0] = block.values.T / block.places[some, :, :1]
             if i != j:
                 B[:, :, row, :, j] = G[..., i]
         return B.reshape(count, points, self.components, nodes * d)
@@ -163,7 +172,7 @@ class NodalBasis:
     @property
     def components(self) -> int:
         """Number of components of strains."""
-        return 3 if self.shape[1] == 2 else 6
+        return 6 if self.shape[1] == 3 else 4 if self.axisymmetric else 3
 
     def stiffness(self, elasticity: Floats) -> sp.csc_array:
         """Stiffness of a linear elastic body, (d N, d N), of (s, s) moduli of all cells or (M, s, s) of each."""
@@ -225,9 +234,13 @@ class NodalBasis:
             )
             areas = np.linalg.norm(across, axis=0)
             normals = self._signs[owner, None] * across / areas
-            share = areas * weights * (1.0 if self.thickness is None else self.thickness[owner, None])
+            share, shapes = areas * weights, kind.values(places)
+            if self.axisymmetric:
+                share = share * 2.0 * np.pi * (self.points[nodes, 0] @ shapes)
+            elif self.thickness is not None:
+                share = share * self.thickness[owner, None]
             values = np.broadcast_to(traction(normals), normals.shape) * share
-            np.add.at(total, nodes, np.einsum("dmq,aq->mad", values, kind.values(places)))
+            np.add.at(total, nodes, np.einsum("dmq,aq->mad", values, shapes))
         return total
 
     def facet_numbers(self, facets: Integers, name: str) -> Integers:
@@ -275,6 +288,24 @@ class NodalBasis:
             shares = self.weights(block) @ block.values.T
             np.add.at(total, block.nodes, shares[:, :, None] * density[block.rows, None])
         return total
+
+    def stressed(self, moduli: Floats, nodes: Floats, cells: Floats) -> tuple[Floats, Floats]:
+        """Nodal forces (N, d) that hold off stresses (M, s) times a field, and the means of these stresses, (M, s).
+
+        The field is the sum of values of nodes, (N,), and of cells, (M,).
+        """
+        total, means = np.zeros(self.shape), np.empty((self.count, self.components))
+        for block in self.blocks:
+            field = nodes[block.nodes] @ block.values + cells[block.rows, None]
+            weights = self.weights(block)
+            means[block.rows] = (
+                moduli[block.rows] * (np.sum(field * weights, axis=1) / np.sum(weights, axis=1))[:, None]
+            )
+            for some in block.some(self.components * self.shape[1] * block.values.size):
+                B, own = self.strains(block, some), field[some] * weights[some]
+                forces = np.einsum("mqsk,ms,mq->mk", B, moduli[block.rows[some]], own, optimize=True)
+                np.subtract.at(total, block.nodes[some], forces.reshape(len(forces), -1, self.shape[1]))
+        return total, means
 
     def means(self, u: Floats) -> Floats:
         """Mean strains of the cells, (M, s), of displacements (N, d) of the nodes."""
@@ -450,8 +481,8 @@ def place_of(at: Floats) -> str:
 def cell_stresses(problem: AnyProblem, u: ArrayLike) -> Floats:
     """Mean stress of every cell of the body, (M, d, d), for displacements u of shape (n,) [force / length^2].
 
-    ``sigma = lambda tr(epsilon) I + 2 mu epsilon`` with the Lame coefficients that the problem was made with. In 2D
-    these are the components in the plane.
+    Those of the strains with the moduli that the problem was made with, less what a change of temperature takes off. In
+    2D these are the components in the plane; of axisymmetric bodies (M, 3, 3) along the radius, the axis and around it.
 
     Parameters
     ----------
@@ -479,16 +510,19 @@ def cell_stresses(problem: AnyProblem, u: ArrayLike) -> Floats:
     [1.0, 1.0, 1.0, 1.0, 1.0, 1.0, 1.0, 1.0]
     """
     mesh = problem.mesh
-    if mesh is None or mesh.lame is None:
+    if mesh is None or not mesh.has_material:
         raise InvalidArgumentError(
             "the problem has no mesh with Lame coefficients; expected one made by fem.contact_problem, "
             "fem.solid_contact_problem or fem.mesh_problem, or BodyMesh(..., lame=...)"
         )
-    body = nodal_basis(mesh.points, mesh.cells)
-    strains = body.means(mesh.displacements(u))
-    values = np.einsum("mst,mt->ms", isotropic(mesh.lame, body.components), strains)
-    d = mesh.points.shape[1]
-    stresses = np.empty((len(mesh.cells), d, d))
+    body = nodal_basis(mesh.points, mesh.cells, AXISYMMETRIC_DEGREE if mesh.axisymmetric else 0)
+    body = replace(body, axisymmetric=mesh.axisymmetric)
+    moduli: Any = mesh.elasticity if mesh.lame is None else isotropic(mesh.lame, body.components)
+    values = np.einsum("mst,mt->ms", moduli, body.means(mesh.displacements(u)))
+    if mesh.initial_stress is not None:
+        values = values + mesh.initial_stress
+    d = 3 if mesh.axisymmetric else mesh.points.shape[1]
+    stresses = np.zeros((len(mesh.cells), d, d))
     for row, (i, j) in enumerate(COMPONENTS[body.components]):
         stresses[:, i, j] = stresses[:, j, i] = values[:, row]
     return stresses

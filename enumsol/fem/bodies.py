@@ -22,6 +22,8 @@ if TYPE_CHECKING:
 _ROUNDED = 1e-12
 #: Of the energies of rigid motions in the supports, the least as a share of the largest that holds a body.
 _HELD = 1e-10
+#: Motions of axisymmetric bodies among those in the plane.
+_ALONG_AXIS = slice(1, 2)
 #: How many parts of a boundary are named to say which body it is.
 _NAMED = 3
 
@@ -40,17 +42,22 @@ class BodyPiece:
         Nodes of the bodies that are joined; of a single body none.
     points : tuple of int
         Displacements of the reference points that join them.
+    axisymmetric : bool
+        The only rigid motion of each is along the axis.
     """
 
     nodes: Mask
     name: str
     joined: tuple[Mask, ...] = ()
     points: tuple[int, ...] = ()
+    axisymmetric: bool = False
 
     def motions(self, points: Floats, count: int) -> Floats:
         """Rigid motions of its bodies, each on its own, and motions of reference points, (count, r)."""
         bodies = self.joined or ((self.nodes,) if np.any(self.nodes) else ())
         columns = [_rigid_motions(points, nodes) for nodes in bodies]
+        if self.axisymmetric:
+            columns = [own[:, _ALONG_AXIS] for own in columns]
         every = np.pad(
             np.hstack([np.zeros((points.size, 0)), *columns]), ((0, count - points.size), (0, len(self.points)))
         )
@@ -71,7 +78,8 @@ class BodyPiece:
         motions = self.motions(points, hold.shape[0])
         count = self.free_motions(points, hold)
         if count == motions.shape[1] and not self.joined:
-            whole = np.where(np.repeat(self.nodes, points.shape[1])[:, None], rigid_motions(points), 0.0)
+            plain = rigid_motions(points)[:, _ALONG_AXIS] if self.axisymmetric else rigid_motions(points)
+            whole = np.where(np.repeat(self.nodes, points.shape[1])[:, None], plain, 0.0)
             return np.pad(whole, ((0, hold.shape[0] - points.size), (0, 0)))
         _, vectors = np.linalg.eigh(motions.T @ (hold @ motions))
         # echelon form: what is a translation becomes one exactly
@@ -89,14 +97,15 @@ class BodyPiece:
         return np.asarray(motions @ table.T)
 
 
-def pieces_of(mesh: PartedMesh) -> list[BodyPiece]:
+def pieces_of(mesh: PartedMesh, axisymmetric: bool = False) -> list[BodyPiece]:
     """All connected bodies of a mesh."""
     points, cells = mesh.points, mesh.cells
     first = np.repeat(cells[:, :1], cells.shape[1] - 1, axis=1)
     links = (np.ones(first.size), (first.ravel(), cells[:, 1:].ravel()))
     count, piece_of = connected_components(sp.coo_array(links, shape=(len(points),) * 2), directed=False)
     masks = [piece_of == piece for piece in range(count)]
-    return [BodyPiece(mask, "the body" if count == 1 else _name_of(mesh, mask)) for mask in masks]
+    names = ["the body" if count == 1 else _name_of(mesh, mask) for mask in masks]
+    return [BodyPiece(mask, name, axisymmetric=axisymmetric) for mask, name in zip(masks, names, strict=True)]
 
 
 def _name_of(mesh: PartedMesh, inside: Mask) -> str:
@@ -131,7 +140,7 @@ def joined(pieces: Sequence[BodyPiece], mesh: PartedMesh, links: sp.csr_array) -
         masks = tuple(piece.nodes for piece in own)
         name = " with ".join(piece.name for piece in own) or "a reference point"
         nodes = np.any([np.zeros(len(mesh.points), dtype=bool), *masks], axis=0)
-        found.append(BodyPiece(nodes, name, masks, points))
+        found.append(BodyPiece(nodes, name, masks, points, any(piece.axisymmetric for piece in own)))
     return found
 
 

@@ -30,7 +30,7 @@ if TYPE_CHECKING:
 
     Names = str | Sequence[str]
     Vectors = Mapping[str, ArrayLike] | None
-    Plane = Literal["strain", "stress"]
+    Plane = Literal["strain", "stress", "axisymmetric"]
     Coefficients = float | Mapping[str, float] | None
     Written = Callable[[str, str, str], str]
 
@@ -49,6 +49,8 @@ class Options:
     pairs: Sequence[Sequence[Any]]
     plane: Plane | Mapping[str, Plane] | None
     thickness: float | Mapping[str, float]
+    expansion: float | Mapping[str, float] | None
+    temperature: ArrayLike | Mapping[str, float] | None
     density: float | Mapping[str, float] | None
     friction: Coefficients
     friction_slope: Coefficients
@@ -186,8 +188,8 @@ def by_part(value: object, name: str) -> dict[str, Any]:
 # -- supports --------------------------------------------------------------------------------------------------------
 
 
-def supports_of(mesh: PartedMesh, options: Options) -> Supports:
-    """Displacements of nodes that the options clamp, symmetry and displacement give in x, y and z.
+def supports_of(mesh: PartedMesh, options: Options, axis: Integers | None = None) -> Supports:
+    """Displacements that the options clamp, symmetry and displacement give; nodes ``axis`` stay on the axis x = 0.
 
     Raises
     ------
@@ -223,6 +225,9 @@ def supports_of(mesh: PartedMesh, options: Options) -> Supports:
         # rollers in a plane are a plane of symmetry, however they are given
         if len(nodes) and len(given) == 1 and (0.0, 0.0) in given.values() and _flat(mesh, nodes) == [*given]:
             found.mirrored[nodes, next(iter(given))] = True
+    if axis is not None and len(axis):
+        fix(found, "the axis of the axisymmetric body", axis, 0)
+        found.mirrored[axis, 0] = True
     return found
 
 

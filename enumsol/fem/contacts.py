@@ -36,6 +36,8 @@ _AT_NODE = 1e-10
 _TOUCHING = 1e-9
 #: Newton's steps at most to a point of a facet; of plane triangles and straight edges the first is the last.
 _STEPS = 30
+#: A share of a uniform pressure below this part of the largest is rounding of none.
+_NO_SHARE = 1e-9
 #: Steps in places of the reference below this have converged.
 _CONVERGED = 1e-13
 
@@ -224,6 +226,9 @@ def _group(
     """Contact nodes with their normals on some facets, and the distances to what they face."""
     dimension = mesh.points.shape[1]
     touching = along(facets) if dimension == 2 else contact_nodes(dimension, facets)
+    if body.axisymmetric:  # a uniform pressure has no part at the node of an edge of second order on the axis
+        shares = body.on_part(facets, parts[0], lambda _: 1.0)[touching, 0]
+        touching = touching[shares > _NO_SHARE * np.max(shares)]
     shared = int(np.sum(np.isin(touching, taken)))
     touching = touching[~np.isin(touching, taken)]
     if pair is None and np.all(held.fixed[touching]):
@@ -233,7 +238,8 @@ def _group(
             f"all nodes of {parts[0]} belong to another contact already; expected a boundary of its own for the pair "
             f"{pair}"
         )
-    integrals = body.on_part(facets, "contact", np.asarray, lumped=True)
+    # the circumference is none on the axis, which has a normal all the same
+    integrals = replace(body, axisymmetric=False).on_part(facets, "contact", np.asarray, lumped=True)
     if obstacle is None:
         normals = unit_vectors(pressed(integrals[touching], touching), "normals of the boundary")
         # what averages with the other half of the body would be

@@ -194,7 +194,8 @@ def _join_parts(body: NodalBasis, mesh: PartedMesh, options: Options, found: Joi
         for name, value in by_part(getattr(options, what), what).items():
             dofs, parts = known.dofs(name), names_of(value, f"{what} of {name}")
             nodes = np.unique(np.concatenate([mesh.nodes(part) for part in parts]))
-            motions = known.motions(name, nodes)
+            rigid = [1] if body.axisymmetric else [*range(known.each)]  # of a body of revolution along the axis
+            dofs, motions = dofs[rigid], known.motions(name, nodes)[:, :, rigid]
             if what == "rigid":
                 of_nodes = nodes[:, None] * known.dimension + np.arange(known.dimension)
                 found.equations.extend(

@@ -11,21 +11,28 @@ from collections.abc import Callable, Mapping
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any, Literal, TypeVar
 
-import numpy as np
 import scipy.sparse as sp
 
 from enumsol.errors import InvalidArgumentError, InvalidProblemError
 from enumsol.fem import conditions
-from enumsol.fem.bases import nodal_basis
+from enumsol.fem.bases import AXISYMMETRIC_DEGREE, nodal_basis
 from enumsol.fem.bodies import pieces_of
 from enumsol.fem.conditions import Options, refuse_old_friction
 from enumsol.fem.contacts import contacts_of
 from enumsol.fem.joints import joints_of
-from enumsol.fem.meshes import PartedMesh, lame
+from enumsol.fem.materials import (
+    is_axisymmetric,
+    masses_of,
+    material_of,
+    nodes_on_axis,
+    thermal_forces,
+    thickness_of,
+)
+from enumsol.fem.meshes import PartedMesh
 from enumsol.fem.placing import in_folder, mesh_of
 from enumsol.fem.scene_checks import refuse_overlaps, refuse_pairs, refuse_walls, scene_notes
 from enumsol.fem.scenes import Scene
-from enumsol.support.arguments import file_path, finite_number, one_of, positive_number, shown, text_of
+from enumsol.support.arguments import file_path, shown, text_of
 from enumsol.support.files import unreadable
 from enumsol.support.messages import shortened
 from enumsol.support.plotting import checked_units
@@ -38,7 +45,7 @@ if TYPE_CHECKING:
 
     from enumsol.fem.conditions import Names, Plane, Vectors
     from enumsol.model.problem3d import AnyProblem
-    from enumsol.support.array_types import ArrayLike, Floats
+    from enumsol.support.array_types import ArrayLike
 
 T = TypeVar("T")
 
@@ -55,18 +62,23 @@ def scene_of(source: PartedMesh | str | os.PathLike[str] | Any, options: Options
     options = options.with_friction_along_axes(mesh.points.shape[1])
     if options.plane is None:
         options = replace(options, plane=_plane(mesh))
-    coefficients = lame_of(mesh, options)
+    axisymmetric, material = is_axisymmetric(mesh, options), material_of(mesh, options)
     thickness = thickness_of(mesh, options.thickness)
-    body = replace(nodal_basis(mesh.points, mesh.cells, labels=mesh.labels), thickness=thickness)
-    held = conditions.supports_of(mesh, options)
+    body = nodal_basis(mesh.points, mesh.cells, AXISYMMETRIC_DEGREE if axisymmetric else 0, mesh.labels)
+    body = replace(body, thickness=thickness, axisymmetric=axisymmetric)
+    held = conditions.supports_of(mesh, options, nodes_on_axis(mesh.points) if axisymmetric else None)
     joints = joints_of(body, mesh, options, held)
     masses = masses_of(mesh, options.density, thickness)
     contacts = contacts_of(body, mesh, options, held)
     forces, slope = (conditions.nodal_forces(body, mesh, options, which) for which in ("", "_slope"))
+    stress = None
+    if options.temperature is not None:
+        warmed, stress = thermal_forces(body, mesh, options, material)
+        forces = forces + warmed
     springs = joints.padded(conditions.part_springs(body, mesh, options.spring)) + joints.springs
     scene = Scene(
-        mesh, options, body, held, joints, contacts, forces, slope, sp.csc_array(springs), coefficients,
-        pieces_of(mesh), masses,
+        mesh, options, body, held, joints, contacts, forces, slope, sp.csc_array(springs), material,
+        pieces_of(mesh, axisymmetric), masses, stress,
     )  # fmt: skip
     refuse_overlaps(scene)
     refuse_walls(scene)
@@ -77,7 +89,15 @@ def scene_of(source: PartedMesh | str | os.PathLike[str] | Any, options: Options
 
 
 def _plane(mesh: PartedMesh) -> Plane:
-    """Plane of a body where no option says it: strain, unless the file has elements of plane stress."""
+    """Plane of a body where no option says it: strain, unless the file has axisymmetric elements or of plane stress."""
+    around = [name.startswith("CAX") for name in mesh.types]
+    if any(around):
+        if not all(around):
+            raise InvalidArgumentError(
+                f"plane is not given, and the cells are elements of types {', '.join(mesh.types)}; expected "
+                "axisymmetric ones only, or none"
+            )
+        return "axisymmetric"
     stressed = [name for name in mesh.types if name.startswith("CPS")]
     if stressed:
         raise InvalidArgumentError(
@@ -85,85 +105,6 @@ def _plane(mesh: PartedMesh) -> Plane:
             "expected plane = 'stress', or 'strain' if the type only carries the mesh, as in files of gmsh"
         )
     return "strain"
-
-
-def lame_of(mesh: PartedMesh, options: Options) -> Floats:
-    """Lame coefficients of all cells, (2,), or of each where they differ, (M, 2).
-
-    Raises
-    ------
-    InvalidArgumentError
-        A constant is not admissible, a name does not exist, or a cell has no value or several.
-    """
-    plane = options.plane
-    if mesh.points.shape[1] == 3 and plane != "strain":
-        raise InvalidArgumentError(f"plane is {plane!r} of a body in 3D; expected it for plane meshes only")
-    values: list[Any] = [
-        _of_cells(mesh, options.young, "young", positive_number),
-        _of_cells(mesh, options.poisson, "poisson", finite_number),
-        _of_cells(mesh, plane, "plane", lambda value, name: one_of(value, name, ("strain", "stress"))),
-    ]
-    if not any(isinstance(value, list) for value in values):
-        return np.asarray(lame(*values))
-    count = len(mesh.cells)
-    each = list(zip(*(value if isinstance(value, list) else [value] * count for value in values), strict=True))
-    known = {constants: lame(*constants) for constants in dict.fromkeys(each)}
-    return np.array([known[constants] for constants in each])
-
-
-def thickness_of(mesh: PartedMesh, value: object) -> Floats | None:
-    """Thickness of every cell of a plane body, (M,); None for one [length].
-
-    Raises
-    ------
-    InvalidArgumentError
-        As `lame_of`, or the body is not plane.
-    """
-    given = _of_cells(mesh, value, "thickness", positive_number)
-    if given == 1:
-        return None
-    if mesh.points.shape[1] == 3:
-        raise InvalidArgumentError("thickness is given for a body in 3D; expected it for plane meshes only")
-    return np.broadcast_to(np.array(given, dtype=np.float64), len(mesh.cells))
-
-
-def masses_of(mesh: PartedMesh, density: object, thickness: Floats | None) -> Floats | None:
-    """Mass per volume, in 2D per area, of every cell, (M,); None where it is uniform and not given.
-
-    Raises
-    ------
-    InvalidArgumentError
-        As `lame_of`.
-    """
-    if density is None:
-        return None if thickness is None or np.ptp(thickness) == 0 else thickness
-    given = np.array(_of_cells(mesh, density, "density", positive_number), dtype=np.float64)
-    return np.asarray(np.broadcast_to(given, len(mesh.cells)) * (1.0 if thickness is None else thickness))
-
-
-def _of_cells(mesh: PartedMesh, value: object, name: str, read: Callable[[Any, str], T]) -> T | list[T]:
-    """A value of all cells, or a list of one for each if it is given by names of parts of the body."""
-    if not isinstance(value, Mapping):
-        return read(value, name)
-    found: list[T | None] = [None] * len(mesh.cells)
-    of_part: dict[int, str] = {}
-    for part, given in conditions.by_part(value, name).items():
-        own = read(given, f"{name} of {part}")
-        for row in mesh.body(part).tolist():
-            if found[row] is not None and found[row] != own:
-                raise InvalidArgumentError(
-                    f"{name} is given for {of_part[row]} and for {part}, which share cells; expected one value"
-                )
-            found[row], of_part[row] = own, part
-    each = [own for own in found if own is not None]
-    if len(each) < len(found):
-        first = found.index(None)
-        others = [part for part, rows in mesh.bodies.items() if first in rows]
-        raise InvalidArgumentError(
-            f"{name} is not given for {len(found) - len(each)} of {len(found)} cells"
-            f"{f', those of {others[0]}' if others else ', which belong to no named part'}; expected it for all"
-        )
-    return each
 
 
 #: What ``pairs`` may be called in TOML files.
@@ -179,6 +120,8 @@ def mesh_problem(
     pairs: Sequence[Sequence[Any]] = (),
     plane: Plane | Mapping[str, Plane] | None = None,
     thickness: float | Mapping[str, float] = 1.0,
+    expansion: float | Mapping[str, float] | None = None,
+    temperature: ArrayLike | Mapping[str, float] | None = None,
     density: float | Mapping[str, float] | None = None,
     friction: float | Mapping[str, float] | None = None,
     friction_slope: float | Mapping[str, float] | None = None,
@@ -242,12 +185,19 @@ def mesh_problem(
         Parts of two bodies that may touch each other. The nodes of the first part are the contact nodes; each is in
         contact with the point of a facet of the second part on the line along its normal (theory, section 11.8). Nodes
         that face no facet have no contact. The gap is the distance along the normal, or the one that is given [length].
-    plane : {"strain", "stress"}, or mapping of names to them, optional
+    plane : {"strain", "stress", "axisymmetric"}, or mapping of names to them, optional
         In 2D, whether strain or stress is plane, for the whole body or for every part of it; by default strain. It has
-        to be given for a file whose elements are of plane stress (CPS4 and the like).
+        to be given for a file whose elements are of plane stress (CPS4 and the like). Of an axisymmetric body x is the
+        distance from the axis and y the place along it; nodes on the axis stay there; all forces and stiffnesses are
+        those of the whole circumference (theory, section 11.10).
     thickness : float, or mapping of names to float
         In 2D, of the whole body or of every part of it; all forces and stiffnesses are multiplied by it. By default
         they are per unit thickness [length].
+    expansion : float, or mapping of names to float, optional
+        Coefficient of thermal expansion, of the whole body or of every part of it [1 / temperature].
+    temperature : float, (N,) array_like, or mapping of names to float, optional
+        Change of temperature from the one at which the body has no stress: uniform, of every node, of parts of the body
+        (``mesh.bodies``), or of parts that are given by nodes or facets; 0 for what is not named.
     density : float, or mapping of names to float, optional
         Mass per volume, of the whole body or of every part of it, for `stability`; a uniform one changes no verdict and
         need not be given [force time^2 / length^4].
@@ -341,7 +291,8 @@ def mesh_problem(
     (24, 4)
     """
     given = Options(
-        young=young, poisson=poisson, contact=contact, pairs=pairs, plane=plane, thickness=thickness, density=density,
+        young=young, poisson=poisson, contact=contact, pairs=pairs, plane=plane, thickness=thickness,
+        expansion=expansion, temperature=temperature, density=density,
         friction=friction, friction_slope=friction_slope, friction2=friction2, friction2_slope=friction2_slope,
         axis=axis, clamp=clamp, symmetry=symmetry, displacement=displacement,
         displacement_slope=displacement_slope, transform=transform, tie=tie, reference=reference, rigid=rigid,

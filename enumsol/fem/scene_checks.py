@@ -341,7 +341,8 @@ def _reach(scene: Scene) -> list[str]:
 def _strains(scene: Scene) -> dict[str, float]:
     """Approximate strains of the body by the loads and by their slopes."""
     thickness = 1.0 if scene.body.thickness is None else float(np.min(scene.body.thickness))
-    force = float(np.min(_stiffness(scene))) * _extent(scene) ** (scene.dimension - 1) * thickness
+    power = 2 if scene.dimension == 3 or scene.body.axisymmetric else 1
+    force = float(np.min(_stiffness(scene))) * _extent(scene) ** power * thickness
     return {
         name: float(np.sum(np.abs(own))) / force
         for name, own in (("loads", scene.forces), ("load slopes", scene.slope))
@@ -349,8 +350,8 @@ def _strains(scene: Scene) -> dict[str, float]:
 
 
 def _stiffness(scene: Scene) -> Floats:
-    """Moduli lambda + 2 mu of the cells."""
-    return np.asarray(np.atleast_2d(scene.lame) @ (1.0, 2.0))
+    """Largest moduli of the cells: lambda + 2 mu of isotropic ones."""
+    return np.atleast_1d(np.max(np.diagonal(scene.material.elasticity, axis1=-2, axis2=-1), axis=-1))
 
 
 def _proportions(scene: Scene) -> list[str]:

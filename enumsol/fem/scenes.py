@@ -5,14 +5,14 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, cast
 
 import numpy as np
 import scipy.sparse as sp
 
 from enumsol.errors import InvalidArgumentError
 from enumsol.fem import bodies, conditions
-from enumsol.fem.bases import NodalBasis, isotropic
+from enumsol.fem.bases import NodalBasis
 from enumsol.fem.bodies import BodyPiece
 from enumsol.fem.conditions import FRICTION, Options
 from enumsol.fem.contacts import Contacts, Group
@@ -38,6 +38,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from enumsol.fem.conditions import Coefficients
+    from enumsol.fem.materials import Material
     from enumsol.fem.restrained import ContactRows
     from enumsol.model.problem3d import AnyProblem
 
@@ -65,11 +66,13 @@ class Scene:
         On all nodes, and their derivatives with respect to alpha [force].
     springs : (m, m) csc_array
         Of all displacements, those of reference points after those of nodes.
-    lame : (2,) or (M, 2) array
+    material : Material
     pieces : list of BodyPiece
         The connected bodies.
     masses : (M,) array or None
         Mass per volume, in 2D per area, of the cells; None where it is uniform and not given.
+    stress : (M, s) array or None
+        Mean stresses of the cells with no displacement, of a change of temperature [force / length^2].
     notes : list of str
         What may not have been intended, each in a sentence.
     """
@@ -83,9 +86,10 @@ class Scene:
     forces: Floats
     slope: Floats
     springs: sp.csc_array
-    lame: Floats
+    material: Material
     pieces: list[BodyPiece]
     masses: Floats | None = None
+    stress: Floats | None = None
     notes: list[str] = field(default_factory=list)
 
     @property
@@ -192,7 +196,7 @@ class Scene:
             surface, more = outward(contacts.facets, mesh.cells), {"areas": contacts.areas}
         gaps, coefficients = self.gaps, self.coefficients
         modes, bound = self._rigid_modes()
-        elastic = self.body.stiffness(isotropic(self.lame, self.body.components))
+        elastic = self.body.stiffness(self.material.elasticity)
         stiffness = sp.csc_array(self.joints.padded(elastic) + self.springs)
         forces, slope = (
             np.append(own, more) for own, more in ((self.forces, self.joints.forces), (self.slope, self.joints.slope))
@@ -212,7 +216,7 @@ class Scene:
             axes,
             modes=modes,
             mass=self._mass(),
-            mesh=lambda motion, moved: BodyMesh(mesh.points, mesh.cells, motion, moved, surface, lame=self.lame),
+            mesh=lambda motion, moved: BodyMesh(mesh.points, mesh.cells, motion, moved, surface, **self._kept()),
             gap=gaps,
             node_ids=mesh.node_names(nodes.nodes),
             coordinates=mesh.points[nodes.nodes],
@@ -222,11 +226,20 @@ class Scene:
         )
         return afresh(problem, notes=tuple(self.notes))
 
+    def _kept(self) -> dict[str, Floats | None]:
+        """Material that the problem keeps of its mesh."""
+        lame = self.material.lame
+        return {
+            "lame": lame,
+            "elasticity": self.material.elasticity if lame is None else None,
+            "initial_stress": self.stress,
+        }
+
     def _mass(self) -> sp.csc_array | None:
         """Consistent mass before supports, (m, m), if it is not uniform or was given."""
         if self.masses is None:
             return None
-        of_nodes = consistent_mass(self.mesh.points, self.mesh.cells, self.masses)
+        of_nodes = consistent_mass(self.mesh.points, self.mesh.cells, self.masses, axisymmetric=self.body.axisymmetric)
         return self.joints.padded(sp.csc_array(sp.kron(of_nodes, sp.eye_array(self.dimension))))
 
     def _rigid_modes(self) -> tuple[Floats | None, float | None]:
@@ -319,7 +332,7 @@ def _bodies(scene: Scene) -> list[str]:
     mesh, sizes = scene.mesh, scene.body.sizes
 
     def size(rows: Integers) -> str:
-        what = "area" if scene.dimension == 2 else "volume"
+        what = "volume" if scene.dimension == 3 or scene.body.axisymmetric else "area"
         return f"{counted(len(rows), 'cell')}, {what} {np.sum(sizes[rows]):.6g}"
 
     lines, said = [], set()
@@ -332,13 +345,17 @@ def _bodies(scene: Scene) -> list[str]:
 
 
 def _material(scene: Scene) -> list[str]:
-    given = () if scene.options.density is None else ("density",)
+    given = [name for name in ("density", "expansion") if getattr(scene.options, name) is not None]
     names = ("young", "poisson", *(("plane", "thickness") if scene.dimension == 2 else ()), *given)
-    return [f"{name} {_said(getattr(scene.options, name))}" for name in names]
+    warm = scene.options.temperature
+    alone = isinstance(warm, (Mapping, int, float))
+    told = [] if warm is None else [f"temperature {_said(cast('Any', warm)) if alone else 'by nodes'}"]
+    return [f"{name} {_said(getattr(scene.options, name))}" for name in names] + told
 
 
 def _parts(scene: Scene) -> list[str]:
-    plain, what = replace(scene.body, thickness=None), "length" if scene.dimension == 2 else "area"
+    plain = replace(scene.body, thickness=None)
+    what = "area" if scene.dimension == 3 or plain.axisymmetric else "length"
     lines = []
     for name, facets in scene.mesh.facets.items():
         try:

@@ -77,9 +77,10 @@ _SYNONYMS = {
 }
 _COMMON = ("gap", "friction", "load_slope", "slip_offset", "node_ids", "coordinates", "mass")
 #: Names of the arrays of a BodyMesh: one of "mesh_motion" and "mesh_dofs" is required, and all of MESH.
-MESH, SURFACE = ("mesh_points", "mesh_cells"), ("mesh_offset", "mesh_facets", "mesh_rows", "mesh_lame")
+MESH = ("mesh_points", "mesh_cells")
+SURFACE = ("mesh_offset", "mesh_facets", "mesh_rows", "mesh_lame", "mesh_elasticity", "mesh_stress")
 _MESH = (*MESH, "mesh_motion", "mesh_dofs", *SURFACE)
-_MESH_TABLES = (*MESH, "mesh_offset", "mesh_facets", "mesh_lame")
+_MESH_TABLES = (*MESH, "mesh_offset", "mesh_facets", "mesh_lame", "mesh_elasticity", "mesh_stress")
 #: Of a body that nothing holds.
 RIGID = ("rigid_modes", "max_rigid_displacement")
 LAYOUT_2D = Layout(
@@ -229,7 +230,9 @@ def arrays_of(problem: AnyProblem) -> dict[str, Any]:
     mean, mesh = getattr(problem, "slip_mean", None), problem.mesh
     if mesh is not None:
         more |= {"mesh_points": mesh.points, "mesh_cells": mesh.cells, "mesh_motion": mesh.motion}
-        more |= dict(zip(SURFACE, (mesh.offset, mesh.facets, mesh.rows, mesh.lame), strict=True))
+        moduli = None if mesh.elasticity is None else mesh.elasticity.reshape(len(mesh.cells), -1)
+        kept = (mesh.offset, mesh.facets, mesh.rows, mesh.lame, moduli, mesh.initial_stress)
+        more |= dict(zip(SURFACE, kept, strict=True))
     if mean is not None:
         more |= dict(zip(MEAN, (mean.T1, mean.T2, mean.offset, mean.weights), strict=True))
     return arrays | {name: part for name, part in more.items() if part is not None}

@@ -184,7 +184,7 @@ def _collection(names: list[str]) -> bytes:
 
 def _stresses(problem: AnyProblem, u: Floats) -> dict[str, Floats]:
     """Cell data of the body: stresses, where the mesh knows its Lame coefficients."""
-    if problem.mesh is None or problem.mesh.lame is None:
+    if problem.mesh is None or not problem.mesh.has_material:
         return {}
     from enumsol.fem.bases import cell_stresses, von_mises  # scikit-fem comes with the first stresses
 

@@ -79,7 +79,7 @@ def _semidefinite(M: sp.csc_array, diagonal: Floats) -> bool:
     return True
 
 
-def consistent_mass(points: Floats, cells: Integers, density: Floats) -> sp.csc_array:
+def consistent_mass(points: Floats, cells: Integers, density: Floats, *, axisymmetric: bool = False) -> sp.csc_array:
     """Consistent mass of one component of the nodes, the same for all, (N, N).
 
     Parameters
@@ -88,6 +88,8 @@ def consistent_mass(points: Floats, cells: Integers, density: Floats) -> sp.csc_
     cells : (M, k) int array, in the order of VTK
     density : (M,) array
         Mass per volume, or in 2D per area, of every cell.
+    axisymmetric : bool
+        x is the distance from the axis, and the mass is that of the whole circumference.
     """
     dimension, count = points.shape[1], len(points)
     total = sp.csc_array((count, count))
@@ -96,6 +98,8 @@ def consistent_mass(points: Floats, cells: Integers, density: Floats) -> sp.csc_
         X, W = kind.quadrature(2 * int(np.max(np.sum(kind.powers, axis=1))) + dimension)
         N = kind.values(X)
         J = np.abs(np.linalg.det(np.einsum("mai,akq->mqik", points[nodes], kind.slopes(X))))
+        if axisymmetric:
+            J = J * 2.0 * np.pi * (points[nodes, 0] @ N)
         own = np.einsum("aq,bq,mq->mab", N, N, J * W * density[rows, None], optimize=True)
         places = np.repeat(nodes, nodes.shape[1], axis=1).ravel(), np.tile(nodes, nodes.shape[1]).ravel()
         total = total + sp.csc_array(sp.coo_array((own.ravel(), places), shape=total.shape))

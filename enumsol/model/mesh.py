@@ -39,6 +39,12 @@ class BodyMesh(Immutable):
     lame : (2,) or (M, 2) array_like or None
         Lame coefficients of all cells or of each, from which stresses follow (`fem.cell_stresses`); kept as (M, 2)
         [force / length^2].
+    elasticity : (s, s), (s s,), (M, s, s) or (M, s s) array_like or None
+        Moduli of all cells or of each, where Lame coefficients do not tell them; kept as (M, s, s). s = 3 in 2D (xx,
+        yy, xy), s = 4 of axisymmetric bodies (along the radius, the axis, around it, and shear), s = 6 in 3D (xx, yy,
+        zz, xy, xz, yz); strains of shear are angles [force / length^2].
+    initial_stress : (M, s) array_like or None
+        Mean stress of every cell with no displacement, of a change of temperature [force / length^2].
 
     Raises
     ------
@@ -62,6 +68,8 @@ class BodyMesh(Immutable):
         facets: ArrayLike | None = None,
         rows: ArrayLike | None = None,
         lame: ArrayLike | None = None,
+        elasticity: ArrayLike | None = None,
+        initial_stress: ArrayLike | None = None,
     ) -> None:
         self.points = sealed(real_array(points, "mesh_points"))
         if self.points.ndim != 2 or self.points.shape[1] not in (2, 3):
@@ -84,13 +92,30 @@ class BodyMesh(Immutable):
                 f"mesh_rows has shape {self.rows.shape}; expected (k,), one for each of mesh_facets"
             )
         self.lame = None if lame is None else _lame(lame, len(self.cells))
+        self.elasticity = None if elasticity is None else _elasticity(elasticity, len(self.cells), d)
+        self.initial_stress = None if initial_stress is None else sealed(real_array(initial_stress, "mesh_stress"))
+        sizes = (4,) if self.axisymmetric else {2: (3,), 3: (6,)}[d]
+        if self.initial_stress is not None and self.initial_stress.shape != (len(self.cells), *sizes):
+            raise InvalidProblemError(
+                f"mesh_stress has shape {self.initial_stress.shape}; expected (M, s) = {(len(self.cells), *sizes)}"
+            )
         self._freeze()
+
+    @property
+    def has_material(self) -> bool:
+        """True if stresses follow from displacements."""
+        return self.lame is not None or self.elasticity is not None
+
+    @property
+    def axisymmetric(self) -> bool:
+        """True if x is the distance from an axis around which the body turns."""
+        return self.elasticity is not None and self.elasticity.shape[1] == 4
 
     def mass(self) -> sp.csc_array:
         """Consistent mass of the degrees of freedom for a density of one, (n, n) [length^d]."""
         from enumsol.model.mass import consistent_mass  # scipy's solvers come with it
 
-        of_nodes = consistent_mass(self.points, self.cells, np.ones(len(self.cells)))
+        of_nodes = consistent_mass(self.points, self.cells, np.ones(len(self.cells)), axisymmetric=self.axisymmetric)
         return sp.csc_array(self.motion.T @ sp.kron(of_nodes, sp.eye_array(self.points.shape[1])) @ self.motion)
 
     @classmethod
@@ -215,6 +240,15 @@ def _lame(value: ArrayLike, count: int) -> Floats:
     if array.shape not in ((2,), (count, 2)):
         raise InvalidProblemError(f"mesh_lame has shape {array.shape}; expected (2,) or (M, 2) = ({count}, 2)")
     return sealed(np.tile(array, (count, 1)) if array.ndim == 1 else array)
+
+
+def _elasticity(value: ArrayLike, count: int, dimension: int) -> Floats:
+    array = real_array(value, "mesh_elasticity")
+    for size in {2: (3, 4), 3: (6,)}[dimension]:
+        if array.size in (size**2, count * size**2) and array.shape[-1] in (size, size**2):
+            return sealed(np.array(np.broadcast_to(array.reshape(-1, size, size), (count, size, size))))
+    expected = {2: "s = 3 or 4", 3: "s = 6"}[dimension]
+    raise InvalidProblemError(f"mesh_elasticity has shape {array.shape}; expected (M, s, s) with {expected}")
 
 
 def _elements(value: ArrayLike, name: str, sizes: tuple[int, ...], count: int) -> Integers:

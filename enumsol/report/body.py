@@ -76,7 +76,7 @@ def surface_stresses(problem: AnyProblem, shape: BodyShape, columns: int) -> Cal
 
     None for a plane body, for one of which no material is known, and where a page does not hold so many columns.
     """
-    if shape.points.shape[1] != 3 or problem.mesh is None or problem.mesh.lame is None:
+    if shape.points.shape[1] != 3 or problem.mesh is None or not problem.mesh.has_material:
         return None
     _, cells = boundary(3, shape.cells)
     if 6 * len(cells) * columns > _MOST_NUMBERS:

@@ -606,7 +606,7 @@ def far_notes(roots: Sequence[Any]) -> list[str]:
     contact nodes have in common; for pairs it is that of one side relative to the other.
     """
     problem = roots[0].problem if roots else None
-    if problem is None or problem.coordinates is None or problem.mesh is None or problem.mesh.lame is None:
+    if problem is None or problem.coordinates is None or problem.mesh is None or not problem.mesh.has_material:
         return []
     places = np.asarray(problem.coordinates)
     places = places - places.mean(axis=0)

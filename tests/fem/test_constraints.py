@@ -352,6 +352,20 @@ def test_a_reference_point_in_3d_carries_force_and_moment(what):
     assert (strain < 1e-14) == (what == "rigid")
 
 
+@pytest.mark.parametrize("what", ["rigid", "coupling"])
+def test_a_reference_point_of_an_axisymmetric_body_moves_along_the_axis(what):
+    """A rod that a force F pulls is longer by F L / (E pi R^2)."""
+    mesh, F = grid(2, 3, 4, 0.5, 2.0), 0.3
+    mesh = fem.PartedMesh(mesh.points, mesh.cells, {**mesh.facets, "low": mesh.facets["right"][:2]})
+    given = {"young": 2.0, "poisson": 0.0, "plane": "axisymmetric", "contact": "low", "gap": 9.0, "friction": 0.3}
+    given |= {"symmetry": ["bottom", "left"], "reference": {"P": (0.0, 7.0)}, what: {"P": "top"}}
+    moved = displacement(fem.mesh_problem(mesh, **given, force={"P": (0.0, F)}))
+    exact = np.outer(mesh.points[:, 1], [0.0, F / (2.0 * np.pi * 0.25)])
+    assert np.allclose(moved, exact, rtol=0, atol=1e-12)
+    message = "a force or moment acts on P in rz, which moves nothing; expected one that does"
+    bad_argument(message, fem.mesh_problem, mesh, **given, moment={"P": 1.0})
+
+
 @pytest.mark.parametrize("pair", [("lower.top", "upper.bottom"), ("upper.bottom", "lower.top")])
 def test_a_rigid_tool_that_a_force_presses_is_in_balance_with_contact(pair):
     mesh = blocks(4, 3, 4)
