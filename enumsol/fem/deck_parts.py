@@ -15,7 +15,6 @@ from enumsol.fem.mesh_files import mesh_of_deck
 from enumsol.support.messages import counted
 
 if TYPE_CHECKING:
-
     from enumsol.decks.cards import DeckPlace
     from enumsol.decks.model import Deck
     from enumsol.fem.meshes import PartedMesh
