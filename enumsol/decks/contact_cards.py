@@ -21,7 +21,7 @@ _OTHER_LAWS = ("ROUGH", "USER", "EXPONENTIAL DECAY", "TAUMAX", "ANISOTROPIC", "D
 _OTHER_TIES = ("CYCLIC SYMMETRY", "MULTISTAGE", "FLUID PERIODIC")
 
 
-@card("SURFACE INTERACTION", "NAME", "USER", "PAD THICKNESS")
+@card("SURFACE INTERACTION", "NAME", "USER", unused=("PAD THICKNESS",))
 def surface_interaction(reading: Reading, given: Card) -> str:
     """*SURFACE INTERACTION: the cards after it say what it is."""
     name = given.needed("NAME")
@@ -34,7 +34,10 @@ def surface_interaction(reading: Reading, given: Card) -> str:
     return f"contact properties {name}, without friction unless a card says so"
 
 
-@card("SURFACE BEHAVIOR", "PRESSURE-OVERCLOSURE", "NO SEPARATION", "PENALTY", "DIRECT", "AUGMENTED LAGRANGE")
+@card(
+    *("SURFACE BEHAVIOR", "PRESSURE-OVERCLOSURE", "NO SEPARATION"),
+    unused=("PENALTY", "DIRECT", "AUGMENTED LAGRANGE"),
+)
 def surface_behavior(reading: Reading, given: Card) -> str:
     """*SURFACE BEHAVIOR: contact is hard, or what touches stays joined."""
     own = _interaction(reading, given)
@@ -51,7 +54,7 @@ def surface_behavior(reading: Reading, given: Card) -> str:
     raise given.refused(f"has PRESSURE-OVERCLOSURE={kind}; expected HARD, {', '.join(_SOFT)} or TIED")
 
 
-@card("FRICTION", "SLIP TOLERANCE", "ELASTIC SLIP", "LAGRANGE", *_OTHER_LAWS)
+@card("FRICTION", *_OTHER_LAWS, unused=("SLIP TOLERANCE", "ELASTIC SLIP", "LAGRANGE"))
 def friction(reading: Reading, given: Card) -> str:
     """*FRICTION: the coefficient; a stiffness of sticking is not used, since what sticks does not move."""
     other = next((name for name in _OTHER_LAWS if name in given.options), None)
@@ -75,22 +78,11 @@ def friction(reading: Reading, given: Card) -> str:
 
 
 @card(
-    "CONTACT PAIR",
-    "INTERACTION",
-    "ADJUST",
-    "TYPE",
-    "SMALL SLIDING",
-    "TIED",
-    "TRACKING",
-    "NO THICKNESS",
-    "HCRIT",
-    "EXTENSION ZONE",
-    "SMOOTH",
-    "SUPPLEMENTARY CONSTRAINTS",
-    "MECHANICAL CONSTRAINT",
-    "CPSET",
-    "WEIGHT",
-    "OP",
+    *("CONTACT PAIR", "INTERACTION", "ADJUST", "TIED", "SMALL SLIDING"),
+    unused=(
+        *("TYPE", "TRACKING", "NO THICKNESS", "HCRIT", "EXTENSION ZONE", "SMOOTH", "SUPPLEMENTARY CONSTRAINTS"),
+        *("MECHANICAL CONSTRAINT", "CPSET", "WEIGHT", "OP"),
+    ),
 )
 def contact_pair(reading: Reading, given: Card) -> str:
     """*CONTACT PAIR: the first surface has the contact nodes, the second one the facets that they face."""
@@ -124,7 +116,10 @@ def clearance(reading: Reading, given: Card) -> str:
     raise given.refused(f"names the pair {slave}:{master}; expected one that was given before: {known}")
 
 
-@card("TIE", "NAME", "ADJUST", "POSITION TOLERANCE", "TYPE", "NO ROTATION", "NO THICKNESS", *_OTHER_TIES)
+@card(
+    *("TIE", "NAME", "ADJUST", "POSITION TOLERANCE", *_OTHER_TIES),
+    unused=("TYPE", "NO ROTATION", "NO THICKNESS"),
+)
 def tie(reading: Reading, given: Card) -> str:
     """*TIE: two surfaces that are joined."""
     other = next((name for name in _OTHER_TIES if name in given.options), None)

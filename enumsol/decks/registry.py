@@ -71,7 +71,7 @@ class Reading:
             It is not known, or not as expected.
         """
         name = compact(card.name)
-        close = [] if name in CARDS or name in HARMLESS else difflib.get_close_matches(name, CARDS, n=1, cutoff=0.8)
+        close = [] if name in CARDS or name in HARMLESS else difflib.get_close_matches(name, CARDS, n=1, cutoff=0.87)
         if self.bare and not any(CARDS[own].of_mesh for own in (name, *close) if own in CARDS):
             return
         if name in self.ignore:
@@ -82,7 +82,9 @@ class Reading:
                 known = f"none but {', '.join(sorted(rule.options))}" if rule.options else "none"
                 raise card.refused(f"has the option {unknown[0]}, which is not read; expected {known}")
             if (became := rule.read(self, card)) is not None:
-                self.account(card, became)
+                passed = [option for option in card.options if compact(option) in rule.passed]
+                said = f"; {', '.join(passed)} {'is' if len(passed) == 1 else 'are'} not used" if passed else ""
+                self.account(card, became + said)
         elif name in HARMLESS:
             self.account(card, f"not used: {HARMLESS[name]}", used=False)
         else:
@@ -98,10 +100,11 @@ class Reading:
 
 @dataclass(frozen=True)
 class Rule:
-    """A function that reads a card, the options that it knows, and whether it belongs to the mesh."""
+    """A function that reads a card, options that it knows, those that change nothing, and whether it is of the mesh."""
 
     read: Reader
     options: frozenset[str]
+    passed: frozenset[str]
     of_mesh: bool
 
 
@@ -111,11 +114,12 @@ CARDS: dict[str, Rule] = {}
 HARMLESS: dict[str, str] = {}
 
 
-def card(name: str, *options: str, of_mesh: bool = False) -> Callable[[Reader], Reader]:
-    """Enter a function in the table of cards, with the options that it knows."""
+def card(name: str, *options: str, unused: Collection[str] = (), of_mesh: bool = False) -> Callable[[Reader], Reader]:
+    """Enter a function in the table of cards, with the options that it knows, and those that change nothing."""
 
     def entered(read: Reader) -> Reader:
-        CARDS[compact(name)] = Rule(read, frozenset(map(compact, options)), of_mesh)
+        passed = frozenset(map(compact, unused))
+        CARDS[compact(name)] = Rule(read, passed.union(map(compact, options)), passed, of_mesh)
         return read
 
     return entered

@@ -44,7 +44,10 @@ harmless("no heat is conducted", *(
 ))  # fmt: skip
 
 
-@card("STEP", "NAME", "NLGEOM", "INC", "PERTURBATION", "AMPLITUDE", "UNSYMM", "SOLVER", "CONVERT SDI", "EXTRAPOLATION")
+@card(
+    *("STEP", "NAME", "NLGEOM", "PERTURBATION"),
+    unused=("INC", "AMPLITUDE", "UNSYMM", "SOLVER", "CONVERT SDI", "EXTRAPOLATION"),
+)
 def step(reading: Reading, given: Card) -> str:
     """*STEP: what follows belongs to a new step."""
     if reading.analysis.steps and not reading.analysis.steps[-1].ended:
@@ -71,15 +74,15 @@ def end_step(reading: Reading, given: Card) -> None:
 
 @card(
     "STATIC",
-    "SOLVER",
-    "DIRECT",
-    "EXPLICIT",
-    "TIME RESET",
-    "TOTAL TIME AT START",
-    "STABILIZE",
-    "FACTOR",
-    "ALLSDTOL",
-    "CONTINUE",
+    unused=(
+        "SOLVER",
+        "DIRECT",
+        "EXPLICIT",
+        "STABILIZE",
+        "FACTOR",
+        "ALLSDTOL",
+        "CONTINUE",
+    ),
 )
 def static(reading: Reading, given: Card) -> str:
     """*STATIC: its time counts for amplitudes."""

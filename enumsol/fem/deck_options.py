@@ -20,6 +20,8 @@ if TYPE_CHECKING:
     from enumsol.fem.deck_parts import DeckParts
     from enumsol.support.array_types import Floats, Integers
 
+#: Options that are given by sets of elements.
+_BY_MATERIAL = ("young", "poisson", "density", "expansion", "thickness")
 #: Families of plane elements, and what `mesh_problem` calls them.
 _PLANES = {"plane strain": "strain", "plane stress": "stress", "axisymmetric": "axisymmetric"}
 
@@ -40,7 +42,7 @@ def shared(deck: Deck, parts: DeckParts) -> dict[str, Any]:
 
 def _materials(deck: Deck, parts: DeckParts) -> dict[str, Any]:
     """Young's modulus, Poisson's ratio, density and thickness by sets of elements, and the plane."""
-    found: dict[str, dict[str, Any]] = {name: {} for name in ("young", "poisson", "density", "thickness")}
+    found: dict[str, dict[str, Any]] = {name: {} for name in _BY_MATERIAL}
     for section, rows in _sections(deck):
         name = parts.elements(rows, section.elements)
         material = deck.materials[section.material]
@@ -51,22 +53,32 @@ def _materials(deck: Deck, parts: DeckParts) -> dict[str, Any]:
                 "isotropic elastic law"
             )
         found["young"][name], found["poisson"][name] = map(float, material.constants)
+        expansion = () if material.expansion is None else material.expansion.tolist()
+        if len(expansion) > 1:
+            raise InvalidArgumentError(
+                f"{material.expansion_place}: *EXPANSION of {material.name} has {len(expansion)} coefficients; "
+                "expected one"
+            )
+        found["expansion"][name] = expansion[0] if expansion else 0.0
         if material.density:
             found["density"][name] = material.density
         found["thickness"][name] = section.thickness or 1.0
     options: dict[str, Any] = {name: found[name] for name in ("young", "poisson")}
+    warmed = any(act.card == "TEMPERATURE" for step in deck.analysis.steps for act in step.acts)
+    if warmed and any(found["expansion"].values()):
+        options["expansion"] = found["expansion"]
     if found["density"].keys() == found["young"].keys():
         options["density"] = found["density"]
-    if set(found["thickness"].values()) != {1.0} and is_plane(deck):
-        options["thickness"] = found["thickness"]
     if is_plane(deck):
         options["plane"] = _planes(deck, parts)
+    if set(found["thickness"].values()) != {1.0} and options.get("plane", "axisymmetric") != "axisymmetric":
+        options["thickness"] = found["thickness"]
     return options
 
 
 def _sections(deck: Deck) -> list[tuple[Section, Integers]]:
     """Sections of bodies with the rows of their elements."""
-    bodies = np.concatenate([np.full(len(block.labels), block.type.is_body) for block in deck.blocks])
+    bodies = np.concatenate([np.full(len(block.labels), deck.is_body(block)) for block in deck.blocks])
     found, without = [], bodies.copy()
     for section in deck.sections:
         rows = deck.elements_of(section.elements, section.place)
@@ -86,6 +98,12 @@ def _sections(deck: Deck) -> list[tuple[Section, Integers]]:
             raise InvalidArgumentError(
                 f"{section.place}: *SOLID SECTION has an ORIENTATION, which is not read; expected an isotropic material"
             )
+        if not np.all(without[rows]):
+            again = deck.element_name(int(rows[np.argmin(without[rows])]))
+            raise InvalidArgumentError(
+                f"{section.place}: *SOLID SECTION holds element {again}, which has one already; expected one material "
+                "for every element"
+            )
         found.append((section, rows))
         without[rows] = False
     if np.any(without):
@@ -99,7 +117,7 @@ def _sections(deck: Deck) -> list[tuple[Section, Integers]]:
 
 def is_plane(deck: Deck) -> bool:
     """True for a deck of plane elements."""
-    return any(block.type.family in _PLANES for block in deck.blocks)
+    return deck.dimension == 2
 
 
 def _planes(deck: Deck, parts: DeckParts) -> Any:
@@ -108,7 +126,7 @@ def _planes(deck: Deck, parts: DeckParts) -> Any:
     first = 0
     for block in deck.blocks:
         own = np.arange(first, first := first + len(block.labels))
-        if block.type.family in _PLANES:
+        if deck.is_body(block):
             rows.setdefault(_PLANES[block.type.family], []).append(own)
     if len(rows) == 1:
         return next(iter(rows))
@@ -181,9 +199,6 @@ def acting(deck: Deck, parts: DeckParts, state: DeckState, joints: DeckJoints) -
     InvalidArgumentError
         It cannot be given to a body here.
     """
-    if state.of("TEMPERATURE"):
-        place = next(place for key, place in state.places.items() if key[0] == "TEMPERATURE")
-        raise InvalidArgumentError(f"{place}: *TEMPERATURE is not read")
     joints.check_grounds(state)
     bodies, points = _on_nodes(deck, parts, state, joints, "BOUNDARY")
     forces, loads = _on_nodes(deck, parts, state, joints, "CLOAD")
@@ -205,6 +220,7 @@ def acting(deck: Deck, parts: DeckParts, state: DeckState, joints: DeckJoints) -
         "moment": moments,
         "pressure": _pressures(deck, parts, state),
         "body_force": _volume_forces(deck, parts, state),
+        "temperature": _temperatures(deck, parts, state),
     }
     return {name: value for name, value in options.items() if value}
 
@@ -271,6 +287,22 @@ def _pressures(deck: Deck, parts: DeckParts, state: DeckState) -> dict[str, floa
         rows = np.array(faces, dtype=np.int64)
         found[parts.faces(rows, f"pressure of line {place.line}", place)] = value
     return found
+
+
+def _temperatures(deck: Deck, parts: DeckParts, state: DeckState) -> list[float]:
+    """Changes of temperature of all nodes of the deck since it was free of stress; none where nothing expands."""
+    given = state.of("TEMPERATURE")
+    if not given:
+        return []
+    if all(material.expansion is None for material in deck.materials.values()):
+        parts.told(next(place for key, place in state.places.items() if key[0] == "TEMPERATURE"), "TEMPERATURE",
+                   "not used: no material has *EXPANSION")  # fmt: skip
+        return []
+    change = np.zeros(len(deck.points))
+    cold = state.of("INITIAL CONDITIONS")
+    for (node, _), value in given.items():
+        change[int(node)] = value - cold.get((node, 0), 0.0)
+    return change.tolist()
 
 
 def _volume_forces(deck: Deck, parts: DeckParts, state: DeckState) -> dict[str, list[float]]:

@@ -12,6 +12,7 @@ import numpy as np
 from enumsol.decks.model import Account, Surface
 from enumsol.errors import InvalidArgumentError
 from enumsol.fem.mesh_files import mesh_of_deck
+from enumsol.model.cells import KINDS, by_kind
 from enumsol.support.messages import counted
 
 if TYPE_CHECKING:
@@ -19,7 +20,7 @@ if TYPE_CHECKING:
     from enumsol.decks.model import Deck
     from enumsol.fem.meshes import PartedMesh
     from enumsol.fem.scenes import Scene
-    from enumsol.support.array_types import Integers
+    from enumsol.support.array_types import Floats, Integers
 
 
 class DeckParts:
@@ -92,9 +93,28 @@ class DeckParts:
                 f"{place}: *CLOAD loads node {self._deck.node_name(int(loose[0]))}, which belongs to no body and to no "
                 "coupling; expected nodes of bodies, or reference nodes"
             )
-        entry = Account(place, kind, f"{counted(len(loose), 'node')} of no body not used", used=False)
+        self.told(place, kind, f"{counted(len(loose), 'node')} of no body not used")
+
+    def told(self, place: DeckPlace, kind: str, became: str) -> None:
+        """Account for what is not used."""
+        entry = Account(place, kind, became, used=False)
         if entry not in self._deck.account:
             self._deck.account.append(entry)
+
+    def at_nodes(self, mesh: PartedMesh, values: Floats) -> Floats:
+        """Values at all nodes of the mesh, of those at the nodes of the deck.
+
+        Nodes in the middle of facets and of elements of 20 nodes have what the shape functions of these give.
+        """
+        found = np.zeros(len(mesh.points))
+        found[: len(self._used)] = values[self._used]
+        for _, cells in by_kind(mesh.points.shape[1], mesh.cells) if len(found) > len(self._used) else ():
+            if cells.shape[1] == 27:
+                sides = cells[:, KINDS[3, 27].facets]
+                corners, between = found[sides[..., :4]].sum(axis=2), found[sides[..., 4:8]].sum(axis=2)
+                found[sides[..., 8]] = 0.5 * between - 0.25 * corners
+                found[cells[:, 26]] = 0.25 * (found[cells[:, 8:20]].sum(axis=1) - found[cells[:, :8]].sum(axis=1))
+        return found
 
     def mesh(self) -> PartedMesh:
         """Mesh of the deck with all of these."""
@@ -105,7 +125,7 @@ class DeckParts:
     @cached_property
     def _used(self) -> Integers:
         """Rows of the nodes of bodies, in the order in which its mesh has them."""
-        own = [block.nodes.ravel() for block in self._deck.blocks if block.type.is_body]
+        own = [block.nodes.ravel() for block in self._deck.blocks if self._deck.is_body(block)]
         return np.unique(np.concatenate([np.zeros(0, dtype=np.int64), *own]))
 
     def adjusted(self, scene: Scene) -> PartedMesh | None:

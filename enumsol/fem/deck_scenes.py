@@ -141,6 +141,8 @@ class DeckModel:
         return self._scenes[number]
 
     def _made(self, options: dict[str, Any]) -> Scene:
+        if "temperature" in options:
+            options = {**options, "temperature": self._parts.at_nodes(self.mesh, np.array(options["temperature"]))}
         scene = mesh_scene(self.mesh, **options)
         moved = self._parts.adjusted(scene)
         if moved is not None:

@@ -59,7 +59,8 @@ def read_mesh(source: str | os.PathLike[str] | Any, groups: str | None = None) -
     Parameters
     ----------
     source : str, path-like or meshio.Mesh
-        A gmsh (.msh) or .vtu file, or any other that meshio knows by its suffix.
+        A gmsh (.msh) or .vtu file, or any other that meshio knows by its suffix; or a deck of CalculiX or Abaqus
+        (.inp), which is read without meshio. Its surfaces, and sets of elements that only lie on a body, are facets.
     groups : str or None
         Name of cell data (integers) by which facets and cells are grouped instead, for formats without named groups.
 

@@ -336,7 +336,7 @@ def _bodies(scene: Scene) -> list[str]:
         return f"{counted(len(rows), 'cell')}, {what} {np.sum(sizes[rows]):.6g}"
 
     lines, said = [], set()
-    for piece in scene.moving:
+    for piece in (piece for piece in scene.moving if np.any(piece.nodes)):
         free = piece.free_motions(mesh.points, scene.hold)
         modes = f"{counted(free, 'rigid mode')} that nothing but contact holds" if free else "held"
         lines.append(f"{piece.name}: {size(np.flatnonzero(np.all(piece.nodes[mesh.cells], axis=1)))}, {modes}")

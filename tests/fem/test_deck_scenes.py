@@ -320,3 +320,72 @@ def test_a_deck_of_parts_and_instances():
     order = [int(np.argmin(np.linalg.norm(other.coordinates - place, axis=1))) for place in problem.coordinates]
     np.testing.assert_allclose(one[0].lambda_n, two[0].lambda_n[order], rtol=1e-9)
     np.testing.assert_allclose(problem.areas, other.areas[order])
+
+
+def test_options_that_change_nothing_are_said(read):
+    contact = CONTACT.replace("DRY\nUNDER", "DRY, TYPE=SURFACE TO SURFACE, SMALL SLIDING\nUNDER")
+    model = read(deck(contact=contact, steps=step(DOWN + PUSH, ", INC=100").replace("*STATIC", "*STATIC, DIRECT")))
+    assert_same(model.problem(), by_hand())
+    for card, option in (("*STEP", "INC"), ("*STATIC", "DIRECT"), ("*CONTACT PAIR", "TYPE")):
+        assert f"; {option} is not used" in next(row for row in str(model).splitlines() if f" {card} " in row)
+
+
+# -- temperatures, and axisymmetric bodies -----------------------------------------------------------------------------
+
+WARM = MATERIALS.replace("*DENSITY\n2.", "*EXPANSION\n1E-3\n*DENSITY\n2.").replace(
+    "*DENSITY\n3.", "*EXPANSION, ZERO=20.\n2E-3\n*DENSITY\n3."
+)
+COLD = "*INITIAL CONDITIONS, TYPE=TEMPERATURE\nALL, 20.\n"
+EXPANSION = {"expansion": {"UPPER": 1e-3, "LOWER": 2e-3}}
+
+
+def test_temperatures_of_steps_strain_the_body(read):
+    steps = (
+        step(DOWN + "*TEMPERATURE\nALL, 30.\n")
+        + step("*TEMPERATURE, OP=NEW\nTOP, 25.\n")
+        + step("*TEMPERATURE\n14, 21.\n")
+    )
+    model = read(deck(materials=WARM, contact=CONTACT + COLD, steps=steps))
+    for number, change in enumerate(([10.0] * 12, [0.0] * 9 + [5.0] * 3, [0.0] * 9 + [1.0, 5.0, 5.0]), 1):
+        assert_same(model.problem(number), by_hand(pressure=None, temperature=change, **EXPANSION))
+    assert len(model.steps()) == 3
+
+
+def test_temperatures_without_initial_ones_count_from_0_and_amplitudes_count(read):
+    steps = step(DOWN + PUSH + "*TEMPERATURE, AMPLITUDE=HALF\nALL, 10.\n")
+    model = read(deck(materials=WARM + "*AMPLITUDE, NAME=HALF\n0., 0., 1., 0.5\n", steps=steps))
+    assert_same(model.problem(), by_hand(temperature=[5.0] * 12, **EXPANSION))
+
+
+def test_temperatures_where_nothing_expands_are_said_not_to_be_used(read):
+    model = read(deck(steps=step(DOWN + PUSH + "*TEMPERATURE\nALL, 10.\n")))
+    assert_same(model.problem(), by_hand())
+    assert "*TEMPERATURE          not used: no material has *EXPANSION" in str(model)
+
+
+@pytest.mark.parametrize(
+    ("cards", "words"),
+    [
+        (
+            {"materials": WARM.replace("1E-3", "1E-3, 1E-3, 1E-3").replace("*EXPANSION\n", "*EXPANSION, TYPE=ORTHO\n")},
+            "EXPANSION of SOFT has 3 coefficients",
+        ),
+        (
+            {"contact": CONTACT + COLD.replace("TYPE=TEMPERATURE", "TYPE=STRESS")},
+            r"\*INITIAL CONDITIONS has TYPE=STRESS",
+        ),
+        ({"contact": CONTACT + COLD.replace("ALL", "EVERY")}, "EVERY"),
+        ({"steps": step("*TEMPERATURE, FILE=heat\n")}, r"\*TEMPERATURE has FILE"),
+        ({"steps": step("*TEMPERATURE\nALL\n")}, r"\*TEMPERATURE has 1 entries in a line; expected 2"),
+    ],
+)
+def test_temperatures_that_cannot_be_used_are_refused(read, cards, words):
+    given = {"materials": WARM, "steps": step(DOWN + "*TEMPERATURE\nALL, 10.\n"), **cards}
+    with pytest.raises(enumsol.InvalidProblemError, match=rf"line \d+: .*{words}"):
+        read(deck(**given)).problem()
+
+
+def test_axisymmetric_elements_are_bodies_of_the_whole_circumference(read):
+    steps = step(DOWN + PUSH + "*CLOAD\n13, 1, -0.5\n")
+    model = read(deck(type="CAX4", held=HELD.replace("SIDE, 1\n", "SIDE, 1\n1, 1\n"), steps=steps))
+    assert_same(model.problem(), by_hand(PARTS, plane="axisymmetric", force={"NODE": (-0.5, 0)}))
