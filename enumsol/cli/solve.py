@@ -142,6 +142,8 @@ MESH_OPTIONS = {
     "pairs": Given(_BODY, "NAME:NAME[:GAP]", _pair),
     "young": Given(_BODY, "[NAME=]E", _number),
     "poisson": Given(_BODY, "[NAME=]NU", _number),
+    "orthotropic": Given(_BODY, "[NAME=]E1,E2,E3,NU12,NU13,NU23,G12,G13,G23", _numbers),
+    "orientation": Given(_BODY, "[NAME=]x1,y1,z1,x2,y2,z2", _numbers),
     "plane": Given(_BODY, "[NAME=]strain|stress|axisymmetric", _plane),
     "thickness": Given(_BODY, "[NAME=]LENGTH", _number),
     "expansion": Given(_BODY, "[NAME=]NUMBER", _number),
@@ -226,6 +228,8 @@ def solve(
     pairs : Parts of two bodies that may touch, first the one whose nodes are the contact nodes; may be repeated.
     young : Young's modulus [force / length^2], by parts of the body.
     poisson : Poisson's ratio, by parts of the body.
+    orthotropic : Nine constants of an orthotropic material, by parts of the body.
+    orientation : Direction of its axis 1 and one in the plane of axes 1 and 2; default: x and y.
     plane : In 2D, plane strain, plane stress, or axisymmetric about x = 0; default: strain, or what the elements of a
         deck are.
     expansion : Coefficient of thermal expansion, by parts of the body.

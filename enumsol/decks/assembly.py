@@ -46,6 +46,12 @@ def put_together(reading: Reading) -> Deck:
             (deck.node_sets if kind == "NSET" else deck.element_sets)[name] = rows
         before = f"{reading.instances[instance].spelled}." if instance else ""
         deck.spelled.setdefault(name, before + members.spelled)
+    empty = {name for name, rows in deck.element_sets.items() if not len(rows)}
+    for section in deck.sections:
+        if section.elements in empty:
+            said = f"not used: there are no elements of {section.elements}"
+            deck.account.append(Account(section.place, section.kind, said, used=False))
+    deck.sections = [section for section in deck.sections if section.elements not in empty]
     return deck
 
 

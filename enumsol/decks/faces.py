@@ -39,12 +39,12 @@ def named_faces(deck: Deck, elements: Integers, label: str, place: DeckPlace) ->
         first += len(block.labels)
         if not len(own):
             continue
-        faces = block.type.shape.faces if block.type.is_body else ()
+        faces = block.type.shape.faces if deck.is_body(block) else ()
         if not label and faces:
             free = free_faces(deck)
             found.append(free[np.isin(free[:, 0], own)])
             continue
-        if not block.type.is_body and block.type.shape.dimension and label in ("", "SPOS", "SNEG", "S1", "S2"):
+        if not faces and block.type.shape.dimension and label in ("", "SPOS", "SNEG", "S1", "S2"):
             number = -1
         elif label[:1] == "S" and label[1:].isdecimal() and 1 <= int(label[1:]) <= len(faces):
             number = int(label[1:]) - 1
@@ -94,14 +94,14 @@ def free_faces(deck: Deck) -> Integers:
     keys, faces, first = [np.zeros((0, 4), dtype=np.int64)], [_NO_FACES], 0
     for block in deck.blocks:
         shape = block.type.shape
-        for number, nodes in enumerate(shape.faces if block.type.is_body else ()):
+        for number, nodes in enumerate(shape.faces if deck.is_body(block) else ()):
             corners = [node for node in nodes if node < shape.corners]
             keys.append(corners_of(block.nodes[:, corners]))
             faces.append(np.column_stack([first + np.arange(len(block.labels)), np.full(len(block.labels), number)]))
         first += len(block.labels)
     every, of = np.concatenate(keys), np.concatenate(faces)
-    least = np.max([block.type.shape.dimension for block in deck.blocks if block.type.is_body], initial=2)
-    whole = np.sum(every >= 0, axis=1) >= least  # a side of a collapsed element may be a line or a point
+    # a side of a collapsed element may be a line or a point
+    whole = np.sum(every >= 0, axis=1) >= max(deck.dimension, 2)
     _, rows, count = np.unique(every[whole], axis=0, return_index=True, return_counts=True)
     return np.asarray(of[whole][np.sort(rows[count == 1])])
 

@@ -61,6 +61,8 @@ def element(reading: Reading, given: Card) -> str | None:
     name = given.needed("TYPE")
     if name in reading.ignore:
         reading.account(given, f"elements of type {name}, not used, as you say", used=False)
+        if own := given.options.get("ELSET"):
+            reading.region.members("ELSET", own, given.place)
         return None
     kind = element_type(name)
     if kind is None:

@@ -285,6 +285,16 @@ class Deck:
     account: list[Account] = field(default_factory=list)
 
     @cached_property
+    def dimension(self) -> int:
+        """Dimension of the bodies, 2 or 3; 0 if there are none."""
+        bodies = [block.type for block in self.blocks if len(block.labels) and block.type.is_body]
+        return max((kind.shape.dimension for kind in bodies), default=0)
+
+    def is_body(self, block: ElementBlock) -> bool:
+        """True for elements of bodies: plane ones beside solid ones only carry names, as in meshes of gmsh."""
+        return block.type.is_body and block.type.shape.dimension == self.dimension
+
+    @cached_property
     def element_labels(self) -> Integers:
         """Numbers (M,) of all elements in the deck."""
         return np.concatenate([np.zeros(0, dtype=np.int64), *(block.labels for block in self.blocks)])

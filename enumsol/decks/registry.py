@@ -71,7 +71,7 @@ class Reading:
             It is not known, or not as expected.
         """
         name = compact(card.name)
-        close = [] if name in CARDS or name in HARMLESS else difflib.get_close_matches(name, CARDS, n=1, cutoff=0.8)
+        close = [] if name in CARDS or name in HARMLESS else difflib.get_close_matches(name, CARDS, n=1, cutoff=0.87)
         if self.bare and not any(CARDS[own].of_mesh for own in (name, *close) if own in CARDS):
             return
         if name in self.ignore:

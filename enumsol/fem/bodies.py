@@ -30,7 +30,7 @@ _NAMED = 3
 
 @dataclass(frozen=True)
 class BodyPiece:
-    """A connected body, or several that equations or springs join.
+    """A connected body, or several that equations or springs join, or displacements of reference points alone.
 
     Attributes
     ----------
@@ -54,10 +54,13 @@ class BodyPiece:
 
     def motions(self, points: Floats, count: int) -> Floats:
         """Rigid motions of its bodies, each on its own, and motions of reference points, (count, r)."""
-        columns = [_rigid_motions(points, nodes) for nodes in self.joined or (self.nodes,)]
+        bodies = self.joined or ((self.nodes,) if np.any(self.nodes) else ())
+        columns = [_rigid_motions(points, nodes) for nodes in bodies]
         if self.axisymmetric:
             columns = [own[:, _ALONG_AXIS] for own in columns]
-        every = np.pad(np.hstack(columns), ((0, count - points.size), (0, len(self.points))))
+        every = np.pad(
+            np.hstack([np.zeros((points.size, 0)), *columns]), ((0, count - points.size), (0, len(self.points)))
+        )
         every[list(self.points), every.shape[1] - len(self.points) + np.arange(len(self.points))] = 1.0
         return every
 
@@ -135,9 +138,9 @@ def joined(pieces: Sequence[BodyPiece], mesh: PartedMesh, links: sp.csr_array) -
             found.append(own[0])
             continue
         masks = tuple(piece.nodes for piece in own)
-        name = " with ".join(piece.name for piece in own)
-        around = any(piece.axisymmetric for piece in own)
-        found.append(BodyPiece(np.any(masks, axis=0), name, masks, points, around))
+        name = " with ".join(piece.name for piece in own) or "a reference point"
+        nodes = np.any([np.zeros(len(mesh.points), dtype=bool), *masks], axis=0)
+        found.append(BodyPiece(nodes, name, masks, points, any(piece.axisymmetric for piece in own)))
     return found
 
 

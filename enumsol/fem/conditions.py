@@ -43,8 +43,10 @@ FRICTION = "friction", "friction_slope", "friction2", "friction2_slope"
 class Options:
     """Options of `mesh_problem`, which says what each stands for."""
 
-    young: float | Mapping[str, float]
-    poisson: float | Mapping[str, float]
+    young: float | Mapping[str, float] | None
+    poisson: float | Mapping[str, float] | None
+    orthotropic: Sequence[float] | Mapping[str, Sequence[float]] | None
+    orientation: Sequence[float] | Mapping[str, Sequence[float]] | None
     contact: Names
     pairs: Sequence[Sequence[Any]]
     plane: Plane | Mapping[str, Plane] | None

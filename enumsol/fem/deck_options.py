@@ -78,7 +78,7 @@ def _materials(deck: Deck, parts: DeckParts) -> dict[str, Any]:
 
 def _sections(deck: Deck) -> list[tuple[Section, Integers]]:
     """Sections of bodies with the rows of their elements."""
-    bodies = np.concatenate([np.full(len(block.labels), block.type.is_body) for block in deck.blocks])
+    bodies = np.concatenate([np.full(len(block.labels), deck.is_body(block)) for block in deck.blocks])
     found, without = [], bodies.copy()
     for section in deck.sections:
         rows = deck.elements_of(section.elements, section.place)
@@ -98,6 +98,12 @@ def _sections(deck: Deck) -> list[tuple[Section, Integers]]:
             raise InvalidArgumentError(
                 f"{section.place}: *SOLID SECTION has an ORIENTATION, which is not read; expected an isotropic material"
             )
+        if not np.all(without[rows]):
+            again = deck.element_name(int(rows[np.argmin(without[rows])]))
+            raise InvalidArgumentError(
+                f"{section.place}: *SOLID SECTION holds element {again}, which has one already; expected one material "
+                "for every element"
+            )
         found.append((section, rows))
         without[rows] = False
     if np.any(without):
@@ -111,7 +117,7 @@ def _sections(deck: Deck) -> list[tuple[Section, Integers]]:
 
 def is_plane(deck: Deck) -> bool:
     """True for a deck of plane elements."""
-    return any(block.type.family in _PLANES for block in deck.blocks)
+    return deck.dimension == 2
 
 
 def _planes(deck: Deck, parts: DeckParts) -> Any:
@@ -120,7 +126,7 @@ def _planes(deck: Deck, parts: DeckParts) -> Any:
     first = 0
     for block in deck.blocks:
         own = np.arange(first, first := first + len(block.labels))
-        if block.type.family in _PLANES:
+        if deck.is_body(block):
             rows.setdefault(_PLANES[block.type.family], []).append(own)
     if len(rows) == 1:
         return next(iter(rows))

@@ -125,7 +125,7 @@ class DeckParts:
     @cached_property
     def _used(self) -> Integers:
         """Rows of the nodes of bodies, in the order in which its mesh has them."""
-        own = [block.nodes.ravel() for block in self._deck.blocks if block.type.is_body]
+        own = [block.nodes.ravel() for block in self._deck.blocks if self._deck.is_body(block)]
         return np.unique(np.concatenate([np.zeros(0, dtype=np.int64), *own]))
 
     def adjusted(self, scene: Scene) -> PartedMesh | None:

@@ -183,6 +183,7 @@ def joints_of(body: NodalBasis, mesh: PartedMesh, options: Options, held: Suppor
         _equation(mesh, value, f"equations row {row}", held, found)
     for target, slope in ((found.forces, ""), (found.slope, "_slope")):
         _push_references(options, known, target, slope)
+    _hold_unused(found)
     _settle(held, found)
     return found
 
@@ -193,7 +194,8 @@ def _join_parts(body: NodalBasis, mesh: PartedMesh, options: Options, found: Joi
         for name, value in by_part(getattr(options, what), what).items():
             dofs, parts = known.dofs(name), names_of(value, f"{what} of {name}")
             nodes = np.unique(np.concatenate([mesh.nodes(part) for part in parts]))
-            motions = known.motions(name, nodes)
+            rigid = [1] if body.axisymmetric else [*range(known.each)]  # of a body of revolution along the axis
+            dofs, motions = dofs[rigid], known.motions(name, nodes)[:, :, rigid]
             if what == "rigid":
                 of_nodes = nodes[:, None] * known.dimension + np.arange(known.dimension)
                 found.equations.extend(
@@ -204,8 +206,6 @@ def _join_parts(body: NodalBasis, mesh: PartedMesh, options: Options, found: Joi
                 weights = _weights(body, mesh, parts)[nodes]
                 found.equations.extend(_spread(name, dofs, nodes, weights, motions))
             found.said.append(f"{name}: {what} with {len(nodes)} nodes of {', '.join(parts)}")
-    if unused := [name for name in known.places if not any(line.startswith(f"{name}: ") for line in found.said)]:
-        raise InvalidArgumentError(f"reference {unused[0]} is joined to no part; expected rigid or coupling for it")
 
 
 def _weights(body: NodalBasis, mesh: PartedMesh, parts: list[str]) -> Floats:
@@ -295,6 +295,34 @@ def _hold_along(mesh: PartedMesh, options: Options, held: Supports, found: Joint
                     fix(held, part, np.array([node]), along, sign * value, sign * slope)
                 else:
                     found.equations.append(Equation(node * d + np.arange(d), axis, name, value, slope))
+
+
+def _hold_unused(found: Joints) -> None:
+    """Hold rotations of reference points that move nothing, as those of a point that equations alone join to nodes.
+
+    Raises
+    ------
+    InvalidArgumentError
+        A force or a moment acts on one, or a point is joined to nothing.
+    """
+    known = found.references
+    joining = [own for own in found.equations if len(own.dofs) > 1]
+    used = np.zeros(known.count, dtype=bool)
+    for own in joining:
+        used[own.dofs[own.coefficients != 0]] = True
+    for name in known.places:
+        dofs = known.dofs(name)
+        if not np.any(used[dofs]):
+            raise InvalidArgumentError(
+                f"reference {name} is joined to no part; expected rigid or coupling for it, or equations that name it"
+            )
+        for dof in dofs[~used[dofs]]:
+            row = dof - known.points.size
+            if found.forces[row] or found.slope[row]:
+                raise InvalidArgumentError(
+                    f"a force or moment acts on {known.named(int(dof))}, which moves nothing; expected one that does"
+                )
+            found.equations.append(Equation(np.array([dof]), np.ones(1), f"what {name} moves"))
 
 
 def _settle(held: Supports, found: Joints) -> None:

@@ -2,18 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, TypeVar
+from typing import TYPE_CHECKING, Any, Literal, TypeVar
 
 import numpy as np
 
 from enumsol.errors import InvalidArgumentError
-from enumsol.fem.bases import isotropic
+from enumsol.fem.bases import COMPONENTS, isotropic
 from enumsol.fem.conditions import by_part
 from enumsol.fem.meshes import SAME, lame
 from enumsol.support.arguments import finite_number, one_of, positive_number, shown
-from enumsol.support.array_arguments import real_array
+from enumsol.support.array_arguments import real_array, short_vector
 
 if TYPE_CHECKING:
     from enumsol.fem.bases import NodalBasis
@@ -26,6 +26,12 @@ T = TypeVar("T")
 #: Names of the states of plane bodies, and the rows of strains in 3D that are theirs.
 PLANES = {"strain": [0, 1, 3], "stress": [0, 1, 3], "axisymmetric": [0, 1, 2, 3]}
 _AXISYMMETRIC = "axisymmetric"
+#: The laws of Lame coefficients in them.
+_LAWS: dict[str, Literal["strain", "stress"]] = {"strain": "strain", "stress": "stress", "axisymmetric": "strain"}
+#: Moduli that couple the plane with shear out of it below this part of the largest are rounding, as are right angles.
+_COUPLED = 1e-9
+#: Eigenvalues of compliances of unit diagonal below this are none.
+_INDEFINITE = 1e-9
 
 
 @dataclass(frozen=True)
@@ -94,39 +100,145 @@ def material_of(mesh: PartedMesh, options: Options) -> Material:
     solid = mesh.points.shape[1] == 3
     if solid and plane != "strain":
         raise InvalidArgumentError(f"plane is {plane!r} of a body in 3D; expected it for plane meshes only")
+    nine, axes = _orthotropic(mesh, options.orthotropic), _orthotropic_axes(mesh, options)
+    others = [own is None for own in nine] if isinstance(nine, list) else nine is None
     values: list[Any] = [
-        _of_cells(mesh, options.young, "young", positive_number),
-        _of_cells(mesh, options.poisson, "poisson", finite_number),
+        _of_cells(mesh, options.young, "young", positive_number, others),
+        _of_cells(mesh, options.poisson, "poisson", finite_number, others),
         _of_cells(mesh, plane, "plane", lambda value, name: one_of(value, name, tuple(PLANES))),
         0.0 if options.expansion is None else _of_cells(mesh, options.expansion, "expansion", finite_number),
+        nine,
+        axes,
     ]
+    _refuse_both(len(mesh.cells), values[0], values[1], nine)
     one = not any(isinstance(value, list) for value in values)
     count = 1 if one else len(mesh.cells)
     each = list(zip(*(value if isinstance(value, list) else [value] * count for value in values), strict=True))
     known = {constants: _moduli(*constants, solid=solid) for constants in dict.fromkeys(each)}
     elasticity, coefficients, thermal = (np.array([known[constants][k] for constants in each]) for k in range(3))
+    plain = others is True and not is_axisymmetric(mesh, options)
     return Material(
         elasticity[0] if one else elasticity,
-        None if is_axisymmetric(mesh, options) else coefficients[0] if one else coefficients,
+        (coefficients[0] if one else coefficients) if plain else None,
         np.broadcast_to(thermal, (len(mesh.cells), thermal.shape[1])) if options.expansion is not None else None,
     )
 
 
 def _moduli(
-    young: float, poisson: float, plane: str, expansion: float, *, solid: bool
+    young: float, poisson: float, plane: str, expansion: float, nine: Any, axes: Any, *, solid: bool
 ) -> tuple[Floats, Floats, Floats]:
     """Moduli (s, s), Lame coefficients (2,), and stresses (s,) of a warming by one degree where all is held."""
-    three = isotropic(np.array(lame(young, poisson)), 6)
+    flat = np.zeros(2) if nine is not None else np.array(lame(young, poisson, _LAWS[plane]))
+    three = isotropic(np.array(lame(young, poisson)), 6) if nine is None else orthotropic_moduli(nine, axes)
     warming = expansion * np.array([1.0, 1.0, 1.0, 0.0, 0.0, 0.0])
     if solid:
-        return three, np.array(lame(young, poisson)), three @ warming
+        return three, flat, three @ warming
     kept = PLANES[plane]
-    if plane == "stress":
-        flat = np.array(lame(young, poisson, "stress"))
+    out = [4, 5] if plane == "axisymmetric" else [2, 4, 5]
+    if np.max(np.abs(three[np.ix_(kept, [4, 5])])) > _COUPLED * np.max(three):
+        raise InvalidArgumentError(
+            f"orientation is {shown(axes)}, with which strains in the plane cause shear out of it; expected a plane "
+            "body in a plane of two of the axes of its material"
+        )
+    if plane != "stress":
+        return three[np.ix_(kept, kept)], flat, (three @ warming)[kept]
+    if nine is None:
         moduli = isotropic(flat, 3)
-        return moduli, flat, moduli @ warming[kept]
-    moduli = three[np.ix_(kept, kept)]
-    return moduli, np.array(lame(young, poisson)), (three @ warming)[kept]
+    else:
+        across = three[np.ix_(kept, out)]
+        moduli = three[np.ix_(kept, kept)] - across @ np.linalg.solve(three[np.ix_(out, out)], across.T)
+    return moduli, flat, moduli @ warming[kept]
+
+
+def _refuse_both(count: int, young: Any, poisson: Any, nine: Any) -> None:
+    """Refuse constants of isotropic materials for orthotropic cells."""
+    if nine is None:
+        return
+    both = [
+        name
+        for name, value in (("young", young), ("poisson", poisson))
+        for own, other in zip(
+            value if isinstance(value, list) else [value] * count,
+            nine if isinstance(nine, list) else [nine] * count,
+            strict=True,
+        )
+        if own is not None and other is not None
+    ]
+    if both:
+        raise InvalidArgumentError(f"{both[0]} and orthotropic are given for the same cells; expected one of them")
+
+
+def orthotropic_moduli(constants: Sequence[float], axes: Sequence[float] | None = None) -> Floats:
+    """Moduli (6, 6) of an orthotropic material in x, y and z, for strains xx, yy, zz, xy, xz, yz (shears are angles).
+
+    Parameters
+    ----------
+    constants : (9,)
+        E1, E2, E3, nu12, nu13, nu23, G12, G13, G23 [force / length^2, -].
+    axes : (6,) or None
+        Direction of axis 1 and one in the plane of axes 1 and 2; None: x and y.
+
+    Raises
+    ------
+    InvalidArgumentError
+        The constants give no positive energy, or the directions are parallel.
+    """
+    E1, E2, E3, n12, n13, n23, *shear = constants
+    compliance = np.zeros((6, 6))
+    compliance[:3, :3] = [
+        [1 / E1, -n12 / E1, -n13 / E1],
+        [-n12 / E1, 1 / E2, -n23 / E2],
+        [-n13 / E1, -n23 / E2, 1 / E3],
+    ]
+    compliance[[3, 4, 5], [3, 4, 5]] = [1 / G for G in shear]
+    scale = np.sqrt(np.diag(compliance))
+    if np.min(np.linalg.eigvalsh(compliance / np.outer(scale, scale))) <= _INDEFINITE:
+        raise InvalidArgumentError(
+            f"orthotropic is {shown(list(constants))}; expected constants with a positive energy for all strains"
+        )
+    own = np.asarray(np.linalg.inv(compliance), dtype=np.float64)
+    if axes is None:
+        return own
+    first, second = np.split(np.asarray(axes, dtype=np.float64), 2)
+    third = np.cross(first, second)
+    if not np.linalg.norm(third) > _COUPLED * np.linalg.norm(first) * np.linalg.norm(second):
+        raise InvalidArgumentError(f"orientation is {shown(list(axes))}; expected two directions that are not parallel")
+    rows = [row / np.linalg.norm(row) for row in (first, np.cross(third, first), third)]
+    along, turned = np.array(rows), np.empty((6, 6))
+    for column, (i, j) in enumerate(COMPONENTS[6]):
+        # strains along the axes of the material of a strain along x, y and z
+        strain = 0.5 * (np.outer(along[:, i], along[:, j]) + np.outer(along[:, j], along[:, i]))
+        turned[:, column] = [strain[k, m] * (1.0 if k == m else 2.0) for k, m in COMPONENTS[6]]
+    return np.asarray(turned.T @ own @ turned)
+
+
+def _orthotropic(mesh: PartedMesh, value: object) -> Any:
+    """Nine constants of all cells, or a list with those of each; None for isotropic ones."""
+    if value is None:
+        return None
+
+    def read(given: Any, name: str) -> tuple[float, ...]:
+        numbers = short_vector(given, name, 9)
+        if np.min(numbers[[0, 1, 2, 6, 7, 8]]) <= 0:
+            raise InvalidArgumentError(
+                f"{name} is {shown(given)}; expected E1, E2, E3, nu12, nu13, nu23, G12, G13, G23, moduli > 0"
+            )
+        return tuple(numbers.tolist())
+
+    return _of_cells(mesh, value, "orthotropic", read, needed=False)
+
+
+def _orthotropic_axes(mesh: PartedMesh, options: Options) -> Any:
+    """Two directions of all cells, or a list with those of each; None for x and y."""
+    if options.orientation is None:
+        return None
+    if options.orthotropic is None:
+        raise InvalidArgumentError("orientation is given without orthotropic; expected both")
+
+    def read(given: Any, name: str) -> tuple[float, ...]:
+        return tuple(short_vector(given, name, 6).tolist())
+
+    return _of_cells(mesh, options.orientation, "orientation", read, needed=False)
 
 
 @dataclass(frozen=True)
@@ -222,8 +334,15 @@ def masses_of(mesh: PartedMesh, density: object, thickness: Floats | None) -> Fl
     return np.asarray(np.broadcast_to(given, len(mesh.cells)) * (1.0 if thickness is None else thickness))
 
 
-def _of_cells(mesh: PartedMesh, value: object, name: str, read: Callable[[Any, str], T]) -> T | list[T]:
-    """A value of all cells, or a list of one for each if it is given by names of parts of the body."""
+def _of_cells(
+    mesh: PartedMesh, value: object, name: str, read: Callable[[Any, str], T], needed: bool | list[bool] = True
+) -> Any:
+    """A value of all cells, or a list of one for each if it is given by names of parts of the body.
+
+    ``needed`` says which cells need one; others may have None.
+    """
+    if value is None and needed is False:
+        return None
     if not isinstance(value, Mapping):
         return read(value, name)
     found: list[T | None] = [None] * len(mesh.cells)
@@ -236,12 +355,13 @@ def _of_cells(mesh: PartedMesh, value: object, name: str, read: Callable[[Any, s
                     f"{name} is given for {of_part[row]} and for {part}, which share cells; expected one value"
                 )
             found[row], of_part[row] = own, part
-    each = [own for own in found if own is not None]
+    wanted = needed if isinstance(needed, list) else [needed] * len(found)
+    each = [k for k, own in enumerate(found) if own is not None or not wanted[k]]
     if len(each) < len(found):
-        first = found.index(None)
+        first = next(k for k, own in enumerate(found) if own is None and wanted[k])
         others = [part for part, rows in mesh.bodies.items() if first in rows]
         raise InvalidArgumentError(
             f"{name} is not given for {len(found) - len(each)} of {len(found)} cells"
             f"{f', those of {others[0]}' if others else ', which belong to no named part'}; expected it for all"
         )
-    return each
+    return found

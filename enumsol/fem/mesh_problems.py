@@ -114,8 +114,10 @@ _PAIRS = "contact_pair"
 def mesh_problem(
     mesh: PartedMesh | str | os.PathLike[str] | Any,
     *,
-    young: float | Mapping[str, float],
-    poisson: float | Mapping[str, float],
+    young: float | Mapping[str, float] | None = None,
+    poisson: float | Mapping[str, float] | None = None,
+    orthotropic: Sequence[float] | Mapping[str, Sequence[float]] | None = None,
+    orientation: Sequence[float] | Mapping[str, Sequence[float]] | None = None,
     contact: Names = (),
     pairs: Sequence[Sequence[Any]] = (),
     plane: Plane | Mapping[str, Plane] | None = None,
@@ -178,7 +180,11 @@ def mesh_problem(
         name of the mesh is a part of the body.
     young, poisson : float, or mapping of names to float
         Young's modulus [force / length^2] and Poisson's ratio [-], of the whole body or of every part of it
-        (``mesh.bodies``).
+        (``mesh.bodies``) that is not orthotropic.
+    orthotropic : nine numbers, or mapping of names to them, optional
+        E1, E2, E3, nu12, nu13, nu23, G12, G13, G23 of the whole body or of parts of it [force / length^2, -].
+    orientation : six numbers, or mapping of names to them, optional
+        Direction of axis 1 of the orthotropic material and one in the plane of axes 1 and 2; by default x and y.
     contact : name or names
         The contact boundary, in contact with a rigid foundation.
     pairs : sequence of (slave, master) or (slave, master, gap)
@@ -291,7 +297,8 @@ def mesh_problem(
     (24, 4)
     """
     given = Options(
-        young=young, poisson=poisson, contact=contact, pairs=pairs, plane=plane, thickness=thickness,
+        young=young, poisson=poisson, orthotropic=orthotropic, orientation=orientation,
+        contact=contact, pairs=pairs, plane=plane, thickness=thickness,
         expansion=expansion, temperature=temperature, density=density,
         friction=friction, friction_slope=friction_slope, friction2=friction2, friction2_slope=friction2_slope,
         axis=axis, clamp=clamp, symmetry=symmetry, displacement=displacement,
@@ -448,6 +455,8 @@ def check_keys(options: Mapping[str, Any], spelled: Callable[[str], str] = str, 
             hint = f"did you mean {close[0]}?" if close else f"expected some of mesh, {', '.join(known)}"
             raise InvalidArgumentError(f"there is no option {shown(name)}; {hint}")
     missing = [name for name, default in known.items() if default is inspect.Parameter.empty and name not in options]
+    if "orthotropic" not in options:
+        missing += [name for name in ("young", "poisson") if name not in options]
     if not {"contact", "pairs"} & options.keys():
         missing.append("contact")
     if missing:

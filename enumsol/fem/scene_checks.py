@@ -286,7 +286,7 @@ def _alone(scene: Scene) -> list[str]:
     return [
         f"{piece.name} touches nothing: it has no contact part and is in no pair"
         for piece in scene.moving
-        if not np.any(touched & piece.nodes)
+        if np.any(piece.nodes) and not np.any(touched & piece.nodes)
     ]
 
 

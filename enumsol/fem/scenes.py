@@ -336,7 +336,7 @@ def _bodies(scene: Scene) -> list[str]:
         return f"{counted(len(rows), 'cell')}, {what} {np.sum(sizes[rows]):.6g}"
 
     lines, said = [], set()
-    for piece in scene.moving:
+    for piece in (piece for piece in scene.moving if np.any(piece.nodes)):
         free = piece.free_motions(mesh.points, scene.hold)
         modes = f"{counted(free, 'rigid mode')} that nothing but contact holds" if free else "held"
         lines.append(f"{piece.name}: {size(np.flatnonzero(np.all(piece.nodes[mesh.cells], axis=1)))}, {modes}")
@@ -346,7 +346,8 @@ def _bodies(scene: Scene) -> list[str]:
 
 def _material(scene: Scene) -> list[str]:
     given = [name for name in ("density", "expansion") if getattr(scene.options, name) is not None]
-    names = ("young", "poisson", *(("plane", "thickness") if scene.dimension == 2 else ()), *given)
+    laws = [name for name in ("young", "poisson", "orthotropic", "orientation") if _given(scene, name)]
+    names = (*laws, *(("plane", "thickness") if scene.dimension == 2 else ()), *given)
     warm = scene.options.temperature
     alone = isinstance(warm, (Mapping, int, float))
     told = [] if warm is None else [f"temperature {_said(cast('Any', warm)) if alone else 'by nodes'}"]
@@ -398,10 +399,16 @@ def _contact(scene: Scene) -> list[str]:
     return [*lines, *(f"{name} {_said(value)}" for name, value in coefficients.items() if value is not None)]
 
 
-def _said(value: float | str | Mapping[str, float | str]) -> str:
-    """A number, a word, or one of these for each of several parts."""
+def _given(scene: Scene, name: str) -> bool:
+    return getattr(scene.options, name) is not None
+
+
+def _said(value: float | str | Mapping[str, Any] | Sequence[float]) -> str:
+    """A number, a word, several numbers, or one of these for each of several parts."""
     if isinstance(value, Mapping):
         return ", ".join(f"{_said(own)} ({part})" for part, own in value.items())
+    if not isinstance(value, (str, float, int)):
+        return _vector(np.asarray(value, dtype=np.float64))
     return value if isinstance(value, str) else f"{float(value):.6g}"
 
 

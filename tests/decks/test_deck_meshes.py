@@ -6,9 +6,10 @@ import pytest
 from alike import assert_same
 from parted_meshes import grid
 from parted_solids import solid
-from refusals import bad_argument
+from refusals import bad_argument, bad_problem
 from written_decks import written
 
+import enumsol
 from enumsol import fem
 
 #: Two tetrahedra on a triangle, as gmsh writes a body with names for surfaces and lines.
@@ -186,3 +187,39 @@ def test_nodes_of_completed_hexahedra_are_named_by_the_corners_around(tmp_path):
     problem = fem.mesh_problem(mesh, young=1, poisson=0, contact="LOW", clamp="HIGH")
     assert len(problem.node_ids) == 9
     assert all(isinstance(name, str) for name in problem.node_ids)
+
+
+#: What makes a deck of the mesh of gmsh: a foundation, contact, supports and a step.
+LOADED = (
+    "*NODE\n21,-1,0,-1\n22,3,0,-1\n23,-1,0,3\n24,0,-1,0\n*ELEMENT,TYPE=C3D4,ELSET=BASE\n50,21,22,23,24\n"
+    "*SOLID SECTION,ELSET=BASE,MATERIAL=M\n*MATERIAL,NAME=M\n*ELASTIC\n1.,0.3\n*SURFACE,NAME=UNDER\nSURFACE1,SPOS\n"
+    "*SURFACE,NAME=FOUNDATION\n50,S1\n*SURFACE INTERACTION,NAME=DRY\n*FRICTION\n0.2\n"
+    "*CONTACT PAIR,INTERACTION=DRY,TYPE=NODE TO SURFACE\nUNDER,FOUNDATION\n*BOUNDARY\n21,1,3\n22,1,3\n23,1,3\n24,1,3\n"
+    "5,1,3\n*STEP\n*STATIC\n*CLOAD\n3,2,-1e-3\n*END STEP\n"
+)
+
+
+def test_decks_with_elements_that_carry_names(tmp_path):
+    """They need no section, make no plane body, and surfaces may name them."""
+    model = enumsol.read_deck(written(tmp_path, GMSH + SECTION + LOADED))
+    assert len(model.mesh.cells) == 3
+    assert parts(model.mesh)["UNDER"] == [[0, 1, 3]]
+    assert parts(model.mesh)["FLOOR"] == [[0, 2, 4], [1, 2, 4]]
+    assert model.problem().node_ids == (1, 2, 4)
+    twice = GMSH + SECTION + SECTION + LOADED
+    bad_problem("line 29: .SOLID SECTION holds element 6, which has one already", problem_of, tmp_path, twice)
+
+
+def test_elements_that_are_left_out(tmp_path):
+    """Their sets are empty then, and their sections are not used; both are said."""
+    beams = "*ELEMENT,TYPE=B31,ELSET=BEAMS\n90,1,4\n*BEAM SECTION,ELSET=BEAMS,MATERIAL=M,SECTION=RECT\n1.,1.\n"
+    text = GMSH + SECTION + beams + LOADED
+    bad_problem("type B31 are beams and carry something .* or --ignore B31", problem_of, tmp_path, text)
+    model = enumsol.read_deck(written(tmp_path, text), ignore=["b31"])
+    assert "elements of type B31, not used, as you say" in str(model)
+    assert "not used: there are no elements of BEAMS" in str(model)
+    assert model.problem().p == 3
+
+
+def problem_of(folder, text):
+    return enumsol.read_deck(written(folder, text)).problem()

@@ -352,6 +352,20 @@ def test_a_reference_point_in_3d_carries_force_and_moment(what):
     assert (strain < 1e-14) == (what == "rigid")
 
 
+@pytest.mark.parametrize("what", ["rigid", "coupling"])
+def test_a_reference_point_of_an_axisymmetric_body_moves_along_the_axis(what):
+    """A rod that a force F pulls is longer by F L / (E pi R^2)."""
+    mesh, F = grid(2, 3, 4, 0.5, 2.0), 0.3
+    mesh = fem.PartedMesh(mesh.points, mesh.cells, {**mesh.facets, "low": mesh.facets["right"][:2]})
+    given = {"young": 2.0, "poisson": 0.0, "plane": "axisymmetric", "contact": "low", "gap": 9.0, "friction": 0.3}
+    given |= {"symmetry": ["bottom", "left"], "reference": {"P": (0.0, 7.0)}, what: {"P": "top"}}
+    moved = displacement(fem.mesh_problem(mesh, **given, force={"P": (0.0, F)}))
+    exact = np.outer(mesh.points[:, 1], [0.0, F / (2.0 * np.pi * 0.25)])
+    assert np.allclose(moved, exact, rtol=0, atol=1e-12)
+    message = "a force or moment acts on P in rz, which moves nothing; expected one that does"
+    bad_argument(message, fem.mesh_problem, mesh, **given, moment={"P": 1.0})
+
+
 @pytest.mark.parametrize("pair", [("lower.top", "upper.bottom"), ("upper.bottom", "lower.top")])
 def test_a_rigid_tool_that_a_force_presses_is_in_balance_with_contact(pair):
     mesh = blocks(4, 3, 4)
@@ -371,6 +385,22 @@ def test_a_rigid_tool_that_a_force_presses_is_in_balance_with_contact(pair):
     given |= {"pairs": (), "contact": "upper.right", "gap": 1}
     more |= {"displacement": {"TOOL": ("free", "free", 0.0)}}
     bad_argument(message, fem.mesh_problem, mesh, **tool, **given, **more)
+
+
+def test_equations_alone_may_join_a_reference_point_to_nodes():
+    """As a coupling of some components does: a force on the point is shared by the nodes that move with it."""
+    mesh = grid(3, 2, 4)
+    terms = [{"terms": [[int(node), "x", 1.0], ["P", "x", -1.0]]} for node in mesh.nodes("right")]
+    given = {**ALONE, "clamp": "left", "reference": {"P": (9.0, 9.0)}, "equations": terms, "force": {"P": (0.3, 0.0)}}
+    moved = displacement(fem.mesh_problem(mesh, **given))
+    C = np.array([row(12, x7=1, x3=-1), row(12, x11=1, x3=-1)])
+    plain = fem.mesh_problem(
+        mesh, **ALONE, spring={"left": (1e-9, 1e-9)}, displacement={"left": (0.0, 0.0)}, force={"right": (0.1, 0)}
+    )
+    left = plain.mesh.dofs
+    K = np.block([[plain.A.toarray(), C[:, left].T], [C[:, left], np.zeros((2, 2))]])
+    expected = plain.mesh.displacements(np.linalg.solve(K, np.append(plain.f, [0, 0]))[: plain.n])
+    assert np.allclose(moved, expected, rtol=0, atol=1e-12)
 
 
 # -- springs, local axes -----------------------------------------------------------------------------------------------
@@ -481,7 +511,10 @@ def test_axes_in_3d_and_all_components_along_them():
     ("changes", "message"),
     [
         ({"reference": {"top": (0.0, 1.0)}}, "reference top is called as a part of the mesh is"),
-        ({"reference": {"P": (0.0, 1.0)}}, "reference P is joined to no part; expected rigid or coupling for it"),
+        (
+            {"reference": {"P": (0.0, 1.0)}},
+            "reference P is joined to no part; expected rigid or coupling for it, or eq",
+        ),
         ({"rigid": {"P": "top"}}, "there is no reference point named 'P'; expected one of none"),
         ({"reference": {"P": (0, 1)}, "coupling": {"P": "tip"}}, "coupling of P has nodes at one point or on one line"),
         ({"equations": [{"terms": []}]}, "equations row 0 is .*; expected terms"),
@@ -498,6 +531,14 @@ def test_axes_in_3d_and_all_components_along_them():
             "transform of tip gives node 11 other axes than that of another part",
         ),
         ({"moment": {"top": 1.0}}, "there is no reference point named 'top'"),
+        (
+            {
+                "reference": {"P": (0, 1)},
+                "moment": {"P": 1.0},
+                "equations": [{"terms": [["tip", "x", 1.0], ["P", "x", -1.0]]}],
+            },
+            "a force or moment acts on P in rz, which moves nothing",
+        ),
     ],
 )
 def test_wrong_joints_are_refused(changes, message):
