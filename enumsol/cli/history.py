@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 import typer
 
 from enumsol.cli import common, output
-from enumsol.cli.decks import deck_named, is_deck
+from enumsol.cli.decks import deck_named, is_deck, step_chosen
 from enumsol.cli.options import PLOT, Arithmetic, Count, OutputFile, PlotFile, Problem, Quiet, Seconds, Title, Units
 from enumsol.cli.progress import Display
 from enumsol.errors import InvalidArgumentError
@@ -79,6 +79,10 @@ def history(
     if proof_file is not None and arithmetic != "verified":
         raise InvalidArgumentError(f"--proof is given with {arithmetic} arithmetic; expected verified")
     if steps is None and is_deck(problem):
+        if step_chosen() is not None:
+            raise InvalidArgumentError(
+                "--step is given with a history of a deck, which takes all of its steps; expected none"
+            )
         body, given = common.load_problem(problem, 1), deck_named(problem).steps()
     else:
         given, body = _steps(problem, steps), common.load_problem(problem)

@@ -144,6 +144,7 @@ MESH_OPTIONS = {
     "poisson": Given(_BODY, "[NAME=]NU", _number),
     "orthotropic": Given(_BODY, "[NAME=]E1,E2,E3,NU12,NU13,NU23,G12,G13,G23", _numbers),
     "orientation": Given(_BODY, "[NAME=]x1,y1,z1,x2,y2,z2", _numbers),
+    "incompatible": Given(_BODY, "NAME", _as_given),
     "plane": Given(_BODY, "[NAME=]strain|stress|axisymmetric", _plane),
     "thickness": Given(_BODY, "[NAME=]LENGTH", _number),
     "expansion": Given(_BODY, "[NAME=]NUMBER", _number),
@@ -230,6 +231,7 @@ def solve(
     poisson : Poisson's ratio, by parts of the body.
     orthotropic : Nine constants of an orthotropic material, by parts of the body.
     orientation : Direction of its axis 1 and one in the plane of axes 1 and 2; default: x and y.
+    incompatible : Part of the body whose quadrilaterals and hexahedra of first order have incompatible modes, as C3D8I.
     plane : In 2D, plane strain, plane stress, or axisymmetric about x = 0; default: strain, or what the elements of a
         deck are.
     expansion : Coefficient of thermal expansion, by parts of the body.

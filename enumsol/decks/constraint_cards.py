@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     from enumsol.decks.registry import Reading
 
 
-@card("EQUATION", "REMOVE")
+@card("EQUATION")
 def equation(reading: Reading, given: Card) -> str:
     """*EQUATION: the number of terms, then a node, a component and a coefficient of each, several in a line."""
     rows, count, at = [*given.rows()], 0, 0
@@ -40,7 +40,7 @@ def equation(reading: Reading, given: Card) -> str:
     return counted(count, "linear equation")
 
 
-@card("MPC", "MODE", "USER")
+@card("MPC")
 def mpc(reading: Reading, given: Card) -> str:
     """*MPC: those of Abaqus that say that nodes move together; others need large displacements."""
     for row, entries in given.rows():
@@ -58,7 +58,7 @@ def mpc(reading: Reading, given: Card) -> str:
     return "nodes that move together"
 
 
-@card("RIGID BODY", "NSET", "ELSET", "TIE NSET", "PIN NSET", "REF NODE", "ROT NODE", "ANALYTICAL SURFACE", "POSITION")
+@card("RIGID BODY", "NSET", "ELSET", "TIE NSET", "PIN NSET", "REF NODE", "ROT NODE", "ANALYTICAL SURFACE")
 def rigid_body(reading: Reading, given: Card) -> str:
     """*RIGID BODY: nodes or elements that move as one."""
     if "ANALYTICAL SURFACE" in given.options:
@@ -82,12 +82,14 @@ def coupling(reading: Reading, given: Card) -> str:
 
 
 @card("KINEMATIC")
-@card("DISTRIBUTING", "WEIGHTING METHOD", "COUPLING")
+@card("DISTRIBUTING", "WEIGHTING METHOD", unused=("COUPLING",))
 def kinematic(reading: Reading, given: Card) -> str:
     """*KINEMATIC and *DISTRIBUTING: whether a surface moves with the reference node, or the node with its mean."""
     own = reading.analysis.coupling
     if own is None:
         raise given.refused("stands without *COUPLING before it; expected that")
+    if (weights := given.name_of("WEIGHTING METHOD")) not in ("", "UNIFORM"):
+        raise given.refused(f"has WEIGHTING METHOD={weights}; expected UNIFORM")
     found: list[int] = []
     for row, entries in given.rows():
         ends = [given.integer(entry, row) for entry in entries[:2] if entry]

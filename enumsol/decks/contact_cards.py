@@ -101,7 +101,7 @@ def contact_pair(reading: Reading, given: Card) -> str:
     return "; ".join(said)
 
 
-@card("CLEARANCE", "SLAVE", "MASTER", "VALUE", "CPSET")
+@card("CLEARANCE", "SLAVE", "MASTER", "VALUE", unused=("CPSET",))
 def clearance(reading: Reading, given: Card) -> str:
     """*CLEARANCE: the distance of a pair, in place of that of the geometry."""
     slave, master = given.needed("SLAVE"), given.needed("MASTER")

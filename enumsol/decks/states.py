@@ -72,6 +72,7 @@ class _Acting:
         self._deck, self._amplitudes = deck, deck.analysis.amplitudes
         self._terms: dict[Key, list[tuple[float, str | None]]] = {}
         self._places: dict[Key, DeckPlace] = {}
+        self._cards: dict[Key, str] = {}
         self._period, self._time = 0.0, 0.0
 
     def take(self, step: DeckStep, time: float) -> None:
@@ -80,10 +81,7 @@ class _Acting:
         for key, terms in self._terms.items():
             self._terms[key] = [term if self._lasts(term[1]) else (self._value(term), None) for term in terms]
         self._period, self._time = step.period, time
-        for kind in step.fresh:
-            kinds = (kind, "GRAV") if kind == "DLOAD" else (kind,)
-            for key in [key for key in self._terms if key[0] in kinds]:
-                del self._terms[key], self._places[key]
+        self._begin_anew(step)
         given: dict[Key, DeckPlace] = {}
         for act in step.acts:
             if act.amplitude is not None and act.amplitude not in self._amplitudes:
@@ -94,6 +92,18 @@ class _Acting:
             for key, reference in _given_to(self._deck, act):
                 self._give(key, (reference, act.amplitude), act, given)
 
+    def _begin_anew(self, step: DeckStep) -> None:
+        """Take away what cards with OP=NEW replace."""
+        loads = {"DLOAD", "DSLOAD"}
+        for key, card in list(self._cards.items()):
+            if card in step.fresh:
+                del self._terms[key], self._places[key], self._cards[key]
+            elif card in loads and step.fresh & loads:
+                raise InvalidArgumentError(
+                    f"{step.place}: *{min(step.fresh & loads)} with OP=NEW follows loads by *{card}, which programs "
+                    "keep or take away; expected OP=NEW of both cards, or of none"
+                )
+
     def _give(self, key: Key, term: tuple[float, str | None], act: Act, given: dict[Key, DeckPlace]) -> None:
         if key in given and key[0] == "CLOAD":
             self._terms[key].append(term)
@@ -103,7 +113,14 @@ class _Acting:
                 f"{act.place}: *{act.card} gives {self._named(key)} the value {term[0]:g}, and {given[key]} gives it "
                 f"{self._terms[key][0][0]:g} in the same step; expected one value"
             )
+        others = (own for own in self._terms if own[:2] == key[:2] and own != key and own not in given)
+        if key[0] == "GRAV" and (before := next(others, None)) is not None:
+            raise InvalidArgumentError(
+                f"{act.place}: *DLOAD gives {key[1]} gravity in another direction than {self._places[before]}, to "
+                "which programs add it or not; expected OP=NEW"
+            )
         self._terms[key], self._places[key], given[key] = [term], act.place, act.place
+        self._cards[key] = act.card
 
     def _lasts(self, amplitude: str | None) -> bool:
         return amplitude is not None and self._amplitudes[amplitude].total

@@ -96,7 +96,7 @@ def static(reading: Reading, given: Card) -> str:
     return f"a static step of time {own.period:g}; increments are not used, as all equilibria at its end are sought"
 
 
-@card("BOUNDARY", "OP", "AMPLITUDE", "TYPE", "REGION TYPE", *_OTHER)
+@card("BOUNDARY", "OP", "AMPLITUDE", "TYPE", *_OTHER)
 def boundary(reading: Reading, given: Card) -> str:
     """*BOUNDARY: components of nodes that are held or moved."""
     if (kind := given.name_of("TYPE")) not in ("", "DISPLACEMENT"):
@@ -133,8 +133,8 @@ def cload(reading: Reading, given: Card) -> str:
     return _given(reading, given, "CLOAD", acts)
 
 
-@card("DLOAD", "OP", "AMPLITUDE", "FOLLOWER", "CONSTANT RESULTANT", *_OTHER)
-@card("DSLOAD", "OP", "AMPLITUDE", "FOLLOWER", "CONSTANT RESULTANT", *_OTHER)
+@card("DLOAD", "OP", "AMPLITUDE", "FOLLOWER", *_OTHER, unused=("CONSTANT RESULTANT",))
+@card("DSLOAD", "OP", "AMPLITUDE", "FOLLOWER", *_OTHER, unused=("CONSTANT RESULTANT",))
 def dload(reading: Reading, given: Card) -> str:
     """*DLOAD and *DSLOAD: pressures on faces of elements or on surfaces, forces per volume and gravity."""
     _without_following(given)
@@ -175,7 +175,7 @@ def initial_conditions(reading: Reading, given: Card) -> str:
     return "temperatures at which nothing is strained"
 
 
-@card("AMPLITUDE", "NAME", "TIME", "VALUE", "DEFINITION", "USER", "SHIFTX", "SHIFTY", "SMOOTH")
+@card("AMPLITUDE", "NAME", "TIME", "VALUE", "DEFINITION", "USER", "SHIFTX", "SHIFTY", unused=("SMOOTH",))
 def amplitude(reading: Reading, given: Card) -> str:
     """*AMPLITUDE: factors over time, of which the one at the end of a step counts."""
     name = given.needed("NAME")
@@ -244,7 +244,7 @@ def _given(reading: Reading, given: Card, kind: str, acts: list[Act]) -> str:
     own = reading.analysis.initial if not reading.analysis.steps and kind == "BOUNDARY" else _step(reading, given)
     anew = given.name_of("OP") == "NEW" and all(act.card != given.name for act in own.acts)  # the first one counts
     if anew:
-        own.fresh.add(kind)
+        own.fresh.add(given.name)
     own.acts.extend(acts)
     return f"{_WORDS[kind]} of {_some(act.target for act in acts)}" + (", in place of all before" if anew else "")
 

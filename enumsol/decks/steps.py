@@ -72,7 +72,7 @@ class DeckStep:
     acts : list of Act
         In their order.
     fresh : set of str
-        Kinds of acts of which none of before stays (OP=NEW): BOUNDARY, CLOAD, DLOAD, TEMPERATURE.
+        Cards of whose acts none of before stays (OP=NEW): BOUNDARY, CLOAD, DLOAD, DSLOAD, TEMPERATURE.
     friction : dict of str to float
         Coefficients that change in this step, by the names of interactions.
     analysis : str or None

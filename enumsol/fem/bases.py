@@ -33,6 +33,8 @@ _BETWEEN = (np.array([[0.5, 0.5, 0.0], [0.0, 0.5, 0.5]]), np.full(3, 1 / 6))
 AXISYMMETRIC_DEGREE = 3
 #: Degree of quadrature on facets: normals of quadratic curved edges.
 _ON_FACETS = 5
+#: Cells that may have incompatible modes, by their forms and degrees of quadrature.
+_INCOMPATIBLE = (("quadrilateral", 3), ("hexahedron", 3))
 #: Numbers that arrays hold at a time while stiffness is integrated.
 _AT_ONCE = 4_000_000
 
@@ -123,6 +125,8 @@ class NodalBasis:
         stands for 1 [length].
     axisymmetric : bool
         x is the distance from the axis, and everything is multiplied by the length of the circumference.
+    incompatible : (M,) bool array or None
+        Quadrilaterals with 4 and hexahedra with 8 nodes that have incompatible modes (theory, section 11.10).
     """
 
     blocks: tuple[Block, ...]
@@ -130,6 +134,7 @@ class NodalBasis:
     cells: Integers
     thickness: Floats | None = None
     axisymmetric: bool = False
+    incompatible: Mask | None = None
 
     @property
     def shape(self) -> tuple[int, int]:
@@ -157,14 +162,16 @@ class NodalBasis:
 
     def strains(self, block: Block, some: slice) -> Floats:
         """Strains of the nodal displacements of cells, (k, q, s, a d): shears are angles (theory, section 11.6)."""
-        G = block.gradients(some)
+        return self._strains(block, some, block.gradients(some), block.values)
+
+    def _strains(self, block: Block, some: slice, G: Floats, values: Floats) -> Floats:
         count, points, nodes, d = G.shape
         B = np.zeros((count, points, self.components, nodes, d))
         for row, (i, j) in enumerate(COMPONENTS[self.components]):
             if j < d:
                 B[:, :, row, :, i] = G[..., j]
             else:  # around the axis, u_r / r
-                B[:, :, row, :, 0] = block.values.T / block.places[some, :, :1]
+                B[:, :, row, :, 0] = values.T / block.places[some, :, :1]
             if i != j:
                 B[:, :, row, :, j] = G[..., i]
         return B.reshape(count, points, self.components, nodes * d)
@@ -187,11 +194,27 @@ class NodalBasis:
                     D = moduli[block.rows[some], None] * weights[some, :, None, None]
                     flat = (len(B), -1, size)
                     K = B.reshape(flat).transpose(0, 2, 1) @ (D @ B).reshape(flat)
+                    if self.incompatible is not None and (block.kind.form, block.kind.degree) in _INCOMPATIBLE:
+                        K -= self._relieved(block, some, B, D) * self.incompatible[block.rows[some], None, None]
                     dofs = (d * block.nodes[some, :, None] + np.arange(d)).reshape(len(B), size)
                     rows.append(np.repeat(dofs, size, axis=1).ravel())
                     columns.append(np.tile(dofs, size).ravel())
                     data.append(K.ravel())
             return _gathered(rows, columns, data, self.shape[0] * self.shape[1])
+
+    def _relieved(self, block: Block, some: slice, B: Floats, D: Floats) -> Floats:
+        """Stiffness that incompatible modes take off cells when they are condensed, (k, a d, a d)."""
+        middle = np.full((1, block.kind.places.shape[1]), 0.5)
+        centre = np.einsum("mai,akq->mik", block.corners[some], block.kind.slopes(middle))
+        ratio = np.linalg.det(centre)[:, None] / np.linalg.det(block.jacobians[some])
+        # of 4 x (1 - x) in each direction of the reference, with the derivatives of its middle
+        slopes = 4.0 - 8.0 * block.kind.quadrature(block.degree)[0]
+        G = ratio[:, :, None, None] * slopes[None, :, :, None] * np.linalg.inv(centre)[:, None]
+        own = self._strains(block, some, G, np.zeros((G.shape[2], G.shape[1])))
+        wide, narrow = own.reshape(len(B), -1, own.shape[3]), B.reshape(len(B), -1, B.shape[3])
+        inner = wide.transpose(0, 2, 1) @ (D @ own).reshape(wide.shape)
+        mixed = wide.transpose(0, 2, 1) @ (D @ B).reshape(narrow.shape)
+        return np.asarray(mixed.transpose(0, 2, 1) @ np.linalg.solve(inner, mixed))
 
     def gram(self) -> sp.csc_array:
         """Products of functions and of their gradients, (N, N): those of one component in H^1."""

@@ -47,6 +47,7 @@ class Options:
     poisson: float | Mapping[str, float] | None
     orthotropic: Sequence[float] | Mapping[str, Sequence[float]] | None
     orientation: Sequence[float] | Mapping[str, Sequence[float]] | None
+    incompatible: bool | Names | None
     contact: Names
     pairs: Sequence[Sequence[Any]]
     plane: Plane | Mapping[str, Plane] | None

@@ -10,7 +10,7 @@ import numpy as np
 
 from enumsol.errors import InvalidArgumentError
 from enumsol.fem.bases import COMPONENTS, isotropic
-from enumsol.fem.conditions import by_part
+from enumsol.fem.conditions import by_part, names_of
 from enumsol.fem.meshes import SAME, lame
 from enumsol.support.arguments import finite_number, one_of, positive_number, shown
 from enumsol.support.array_arguments import real_array, short_vector
@@ -19,13 +19,15 @@ if TYPE_CHECKING:
     from enumsol.fem.bases import NodalBasis
     from enumsol.fem.conditions import Options
     from enumsol.fem.meshes import PartedMesh
-    from enumsol.support.array_types import Floats, Integers
+    from enumsol.support.array_types import Floats, Integers, Mask
 
 T = TypeVar("T")
 
 #: Names of the states of plane bodies, and the rows of strains in 3D that are theirs.
 PLANES = {"strain": [0, 1, 3], "stress": [0, 1, 3], "axisymmetric": [0, 1, 2, 3]}
 _AXISYMMETRIC = "axisymmetric"
+#: Types of elements in decks that have incompatible modes.
+WITH_MODES = ("C3D8I", "CPE4I", "CPS4I")
 #: The laws of Lame coefficients in them.
 _LAWS: dict[str, Literal["strain", "stress"]] = {"strain": "strain", "stress": "stress", "axisymmetric": "strain"}
 #: Moduli that couple the plane with shear out of it below this part of the largest are rounding, as are right angles.
@@ -81,6 +83,29 @@ def is_axisymmetric(mesh: PartedMesh, options: Options) -> bool:
             "none"
         )
     return True
+
+
+def incompatible_of(mesh: PartedMesh, options: Options) -> Mask | None:
+    """Cells that have incompatible modes, (M,); None for none.
+
+    Raises
+    ------
+    InvalidArgumentError
+        A part does not exist, or the body is axisymmetric.
+    """
+    given = options.incompatible
+    if given is None:
+        given = bool(mesh.types) and all(name in WITH_MODES for name in mesh.types)
+    if not isinstance(given, bool) and not names_of(given, "incompatible"):
+        return None
+    if given is False:
+        return None
+    if is_axisymmetric(mesh, options):
+        raise InvalidArgumentError("incompatible is given for an axisymmetric body; expected it in the plane or in 3D")
+    found = np.zeros(len(mesh.cells), dtype=bool)
+    for part in [] if isinstance(given, bool) else names_of(given, "incompatible"):
+        found[mesh.body(part)] = True
+    return np.ones_like(found) if given is True else found
 
 
 def nodes_on_axis(points: Floats) -> Integers:

@@ -21,6 +21,7 @@ from enumsol.fem.conditions import Options, refuse_old_friction
 from enumsol.fem.contacts import contacts_of
 from enumsol.fem.joints import joints_of
 from enumsol.fem.materials import (
+    incompatible_of,
     is_axisymmetric,
     masses_of,
     material_of,
@@ -65,7 +66,8 @@ def scene_of(source: PartedMesh | str | os.PathLike[str] | Any, options: Options
     axisymmetric, material = is_axisymmetric(mesh, options), material_of(mesh, options)
     thickness = thickness_of(mesh, options.thickness)
     body = nodal_basis(mesh.points, mesh.cells, AXISYMMETRIC_DEGREE if axisymmetric else 0, mesh.labels)
-    body = replace(body, thickness=thickness, axisymmetric=axisymmetric)
+    modes = incompatible_of(mesh, options)
+    body = replace(body, thickness=thickness, axisymmetric=axisymmetric, incompatible=modes)
     held = conditions.supports_of(mesh, options, nodes_on_axis(mesh.points) if axisymmetric else None)
     joints = joints_of(body, mesh, options, held)
     masses = masses_of(mesh, options.density, thickness)
@@ -118,6 +120,7 @@ def mesh_problem(
     poisson: float | Mapping[str, float] | None = None,
     orthotropic: Sequence[float] | Mapping[str, Sequence[float]] | None = None,
     orientation: Sequence[float] | Mapping[str, Sequence[float]] | None = None,
+    incompatible: bool | Names | None = None,
     contact: Names = (),
     pairs: Sequence[Sequence[Any]] = (),
     plane: Plane | Mapping[str, Plane] | None = None,
@@ -185,6 +188,9 @@ def mesh_problem(
         E1, E2, E3, nu12, nu13, nu23, G12, G13, G23 of the whole body or of parts of it [force / length^2, -].
     orientation : six numbers, or mapping of names to them, optional
         Direction of axis 1 of the orthotropic material and one in the plane of axes 1 and 2; by default x and y.
+    incompatible : bool, name or names, optional
+        Parts of the body, or all of it, whose quadrilaterals with 4 and hexahedra with 8 nodes have incompatible modes,
+        as C3D8I and CPS4I have: they bend as beams do. By default all if the elements of a deck are all of such types.
     contact : name or names
         The contact boundary, in contact with a rigid foundation.
     pairs : sequence of (slave, master) or (slave, master, gap)
@@ -298,7 +304,7 @@ def mesh_problem(
     """
     given = Options(
         young=young, poisson=poisson, orthotropic=orthotropic, orientation=orientation,
-        contact=contact, pairs=pairs, plane=plane, thickness=thickness,
+        incompatible=incompatible, contact=contact, pairs=pairs, plane=plane, thickness=thickness,
         expansion=expansion, temperature=temperature, density=density,
         friction=friction, friction_slope=friction_slope, friction2=friction2, friction2_slope=friction2_slope,
         axis=axis, clamp=clamp, symmetry=symmetry, displacement=displacement,

@@ -12,6 +12,7 @@ from enumsol.errors import InvalidArgumentError
 from enumsol.fem.bases import SIMPLICES, corners_of, place_of
 from enumsol.fem.bodies import holding
 from enumsol.fem.contacts import Group, faced
+from enumsol.fem.materials import WITH_MODES
 from enumsol.fem.meshes import SAME, PartedMesh, cell_name, unit_vectors
 from enumsol.fem.scenes import Scene
 from enumsol.model.cells import boundary_facets
@@ -192,7 +193,7 @@ def _formulations(scene: Scene) -> list[str]:
         f"elements of type {kind.name} are taken as {kind.plain}, with full integration and without incompatible "
         "modes, hybrid or modified formulations, which can be stiffer in bending than the program of the file has them"
         for kind in kinds
-        if kind.name != kind.plain
+        if kind.name != kind.plain and not (kind.name in WITH_MODES and scene.body.incompatible is not None)
     ]
 
 

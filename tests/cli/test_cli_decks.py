@@ -50,6 +50,8 @@ def test_of_several_steps_one_is_named(here, capsys):
     assert "1 root (verified" in capsys.readouterr().out
     assert main(["roots", "model.inp", "--step", "3"]) == 2
     assert "expected one of 1 to 2" in capsys.readouterr().err
+    assert main(["history", "model.inp", "--step", "2"]) == 2
+    assert "--step is given with a history of a deck" in capsys.readouterr().err
 
 
 def test_what_would_change_the_answer_is_refused_unless_it_is_ignored(here, capsys):

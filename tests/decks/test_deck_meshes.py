@@ -144,15 +144,15 @@ def same_as_by_meshio(folder, body):
 
 
 def test_notes_on_other_formulations(tmp_path):
-    """A beam of C3D8I, as in bending: the plain element takes its place, and a note says so."""
+    """A beam of C3D8R, as in bending: the plain element takes its place, and a note says so."""
     box = fem.box(2, 1, 1)
     nodes = "".join(f"{1 + k},{x!r},{y!r},{z!r}\n" for k, (x, y, z) in enumerate(box.points.tolist()))
     cells = "".join(f"{1 + k}," + ",".join(str(1 + node) for node in row) + "\n" for k, row in enumerate(box.cells))
-    text = f"*NODE\n{nodes}*ELEMENT,TYPE=C3D8I,ELSET=B\n{cells}*SURFACE,NAME=WALL\n1,S6\n*SURFACE,NAME=TIP\nB,S1\n"
+    text = f"*NODE\n{nodes}*ELEMENT,TYPE=C3D8R,ELSET=B\n{cells}*SURFACE,NAME=WALL\n1,S6\n*SURFACE,NAME=TIP\nB,S1\n"
     given = {"young": 210000, "poisson": 0, "contact": "TIP", "clamp": "WALL"}
     (note,) = [note for note in fem.mesh_scene(written(tmp_path, text), **given).notes if "C3D8" in note]
-    assert note.startswith("elements of type C3D8I are taken as C3D8, with full integration and without incompatible")
-    plain = fem.mesh_scene(written(tmp_path, text.replace("C3D8I", "C3D8")), **given)
+    assert note.startswith("elements of type C3D8R are taken as C3D8, with full integration and without incompatible")
+    plain = fem.mesh_scene(written(tmp_path, text.replace("C3D8R", "C3D8")), **given)
     assert not any("C3D8" in note for note in plain.notes)
 
 

@@ -99,6 +99,8 @@ WRONG = {
     "nodes that stay in a plane": (deck(contact=CONTACT + "*MPC\nPLANE, 14, 15, 16\n"), r"line \d+: \*MPC is of type PLANE; expected TIE, PIN or BEAM"),
     "half a coupling": (deck(mesh=MESH + POINT, contact=CONTACT + "*COUPLING, REF NODE=99, SURFACE=ABOVE, CONSTRAINT NAME=C\n*KINEMATIC\n1, 1\n"), r"line \d+: \*COUPLING couples the components 1; expected all displacements, 1 to 2"),
     "a coupling of nothing": (deck(mesh=MESH + POINT, contact=CONTACT + "*COUPLING, REF NODE=99, SURFACE=NOWHERE, CONSTRAINT NAME=C\n*KINEMATIC\n"), r"line \d+: \*COUPLING names NOWHERE; expected a surface"),
+    "a force that is distributed by weights": (deck(mesh=MESH + POINT, contact=CONTACT + "*COUPLING, REF NODE=99, SURFACE=ABOVE, CONSTRAINT NAME=C\n*DISTRIBUTING, WEIGHTING METHOD=CUBIC\n"), r"line \d+: \*DISTRIBUTING has WEIGHTING METHOD=CUBIC"),
+    "a rigid body about its mean": (deck(mesh=MESH + POINT, contact=CONTACT + "*RIGID BODY, NSET=TOP, REF NODE=99, POSITION=CENTER OF MASS\n"), r"line \d+: \*RIGID BODY has the option POSITION"),
     "no coupling": (deck(contact=CONTACT + "*KINEMATIC\n1, 2\n"), r"line \d+: \*KINEMATIC stands without \*COUPLING"),
     "a rigid body without a node": (deck(contact=CONTACT + "*RIGID BODY, NSET=TOP\n"), r"line \d+: \*RIGID BODY has no REF NODE"),
     "a rigid body of nothing": (deck(mesh=MESH + POINT, contact=CONTACT + "*RIGID BODY, REF NODE=99\n"), r"line \d+: \*RIGID BODY has no NSET or ELSET"),

@@ -208,6 +208,29 @@ def test_loads_of_steps_stay_are_replaced_and_end(read):
     np.testing.assert_allclose([given.load for given in model.steps()], [other.f for other in by_steps], atol=1e-12)
 
 
+@pytest.mark.parametrize(
+    ("first", "second", "words"),
+    [
+        ("*DSLOAD\nRIGHT, P, 2.\n", "*DLOAD, OP=NEW\n12, BX, 1.\n", r"\*DLOAD with OP=NEW follows loads by \*DSLOAD"),
+        (
+            "*DLOAD\nUPPER, GRAV, 9.81, 0., -1., 0.\n",
+            "*DLOAD\nUPPER, GRAV, 9.81, 1., 0., 0.\n",
+            "gravity in another direction",
+        ),
+    ],
+)
+def test_steps_that_programs_read_differently_are_refused(read, first, second, words):
+    with pytest.raises(enumsol.InvalidProblemError, match=rf"line \d+: .*{words}"):
+        read(deck(steps=step(DOWN + first) + step(second)))
+
+
+def test_gravity_that_begins_anew_turns(read):
+    turned = step(DOWN + "*DLOAD\nUPPER, GRAV, 9.81, 0., -1., 0.\n") + step(
+        "*DLOAD, OP=NEW\nUPPER, GRAV, 9.81, 1., 0., 0.\n"
+    )
+    assert_same(read(deck(steps=turned)).problem(2), by_hand(pressure=None, body_force={"UPPER": (2 * 9.81, 0)}))
+
+
 def test_amplitudes_end_with_their_step_unless_they_are_of_all_time(read):
     table = "*AMPLITUDE, NAME={}{}\n0., 0., 1., 0.5, 2., 1., 3., 0.25\n"
     materials = MATERIALS + table.format("OWN", "") + table.format("ALL", ", TIME=TOTAL TIME")
