@@ -121,7 +121,7 @@ def _audit_result(
     name: str, file: str, alpha: str | None, tolerance: float | None, arithmetic: Arithmetic, json_file: str | None
 ) -> NoReturn:
     """Compare a result of CalculiX with all roots, and end the command."""
-    from enumsol.auditing.results import TOLERANCE, compare_result  # numpy and scipy: not for --help
+    from enumsol.auditing.results import TOLERANCE, compare_result
     from enumsol.io.calculix import read_results
     from enumsol.roots.enumerate import enumerate_roots
 
@@ -130,7 +130,9 @@ def _audit_result(
     if body.mesh is None:
         raise InvalidArgumentError(f"{name} has no mesh; expected a problem made of one, to compare with {file}")
     plane = None if about is None else about.options.plane
-    moved = result.on(body.mesh, axisymmetric=str(plane) == "axisymmetric")
+
+    numbers = None if about is None else about.mesh.node_labels
+    moved = result.on(body.mesh, numbers, axisymmetric=str(plane) == "axisymmetric")
     with search_display() as display:
         found, ended = so_far(
             lambda: enumerate_roots(body, parse_alpha(alpha or "0"), arithmetic=arithmetic, progress=display)

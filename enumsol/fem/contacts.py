@@ -405,7 +405,7 @@ class _Facets:
 
     @cached_property
     def centre(self) -> Floats:
-        """Of the reference, (d - 1,)."""
+        """Middle of the reference, (d - 1,)."""
         return np.asarray(self.kind.places[: self.kind.corners].mean(axis=0))
 
     def inside(self, places: Floats) -> Mask:

@@ -72,55 +72,76 @@ class NodalResult:
     displacements: Floats
     points: Floats | None
 
-    def on(self, mesh: BodyMesh, numbers: Integers | None = None, *, axisymmetric: bool = False) -> Floats:
+    def on(self, mesh: BodyMesh, numbers: Sequence[object] | None = None, *, axisymmetric: bool = False) -> Floats:
         """Displacements of the nodes of a mesh, (N, d).
 
-        Nodes are told by their positions where the file has them: plane bodies are written as one layer of solid
-        cells, and a node of the mesh is then the mean of those with its position in the plane, of axisymmetric bodies
-        those at its radius. Of a `.dat` file ``numbers`` (N,) are those of the nodes of the mesh. Nodes that
-        the mesh has made, and nodes that the file lacks, have NaN.
+        Nodes are told by ``numbers`` (N,), those of the nodes of the mesh, where the file has these at their places, as
+        a `.dat` file is taken to have. Otherwise they are told by their positions: plane bodies are written as one
+        layer of solid cells, and a node of the mesh is then the mean of those with its position in the plane, of
+        axisymmetric bodies those at its radius. Nodes that the file lacks have NaN, and of nodes that are told by their
+        positions those which share theirs, as bodies in contact do.
 
         Raises
         ------
         InvalidArgumentError
             The file is of another mesh, or has no positions and ``numbers`` is not given.
         """
-        d = mesh.points.shape[1]
-        found = np.full(mesh.points.shape, np.nan)
-        if self.points is None:
-            if numbers is None:
-                raise InvalidArgumentError(
-                    "a .dat file has no positions of nodes, and the numbers of the nodes are not known; expected "
-                    "a .frd file, or a deck as the problem"
-                )
-            place = dict(zip(self.numbers.tolist(), range(len(self.numbers)), strict=True))
-            rows = np.array([place.get(number, -1) for number in np.asarray(numbers).tolist()])
-            found[rows >= 0] = self.displacements[rows[rows >= 0], :d]
-        else:
-            places, moves = self.points[:, :d], self.displacements[:, :d]
-            if axisymmetric:
-                radius = np.hypot(self.points[:, 0], self.points[:, 2])
-                along = np.where(radius == 0, 0.0, 1.0 / np.where(radius == 0, 1.0, radius))
-                inward = along * (
-                    self.points[:, 0] * self.displacements[:, 0] + self.points[:, 2] * self.displacements[:, 2]
-                )
-                places, moves = np.column_stack([radius, places[:, 1]]), np.column_stack([inward, moves[:, 1]])
-            near = _SAME_PLACE * float(np.max(np.ptp(mesh.points, axis=0)))
-            distance, nearest = cKDTree(mesh.points).query(places)
-            ours = distance <= near
-            count = np.bincount(nearest[ours], minlength=len(found)).astype(np.float64)
-            known = count > 0
-            for k in range(d):
-                sums = np.bincount(nearest[ours], moves[ours, k], minlength=len(found))
-                found[known, k] = sums[known] / count[known]
-        corners = np.unique(mesh.cells)
-        absent = int(np.sum(np.isnan(found[corners, 0])))
-        if 2 * absent > len(corners):
+        if self.points is None and numbers is None:
             raise InvalidArgumentError(
-                f"{absent} of {counted(len(corners), 'node')} of the problem are not in the file; expected a result of "
-                "the same mesh"
+                "a .dat file has no positions of nodes, and the numbers of the nodes are not known; expected "
+                "a .frd file, or a deck as the problem"
+            )
+        found = np.full(mesh.points.shape, np.nan) if numbers is None else self._by_number(mesh, numbers)
+        if self.points is not None and _absent(mesh, found):
+            found = self._by_place(mesh, axisymmetric)
+        if absent := _absent(mesh, found):
+            raise InvalidArgumentError(
+                f"{absent} of {counted(len(np.unique(mesh.cells)), 'node')} of the problem are not in the file, or "
+                "share their positions; expected a result of the same mesh"
             )
         return found
+
+    def _by_number(self, mesh: BodyMesh, numbers: Sequence[object]) -> Floats:
+        place = {str(number): row for row, number in enumerate(self.numbers.tolist())}
+        rows = np.array([place.get(str(number), -1) for number in numbers])
+        found, d = np.full(mesh.points.shape, np.nan), mesh.points.shape[1]
+        known = rows >= 0
+        if self.points is not None:
+            off = np.max(np.abs(self.points[rows, :d] - mesh.points), axis=1)
+            known &= not np.any(known & (off > _near(mesh)))  # numbers of another mesh
+        found[known] = self.displacements[rows[known], :d]
+        return found
+
+    def _by_place(self, mesh: BodyMesh, axisymmetric: bool) -> Floats:
+        d = mesh.points.shape[1]
+        places, moves = np.asarray(self.points)[:, :d], self.displacements[:, :d]
+        if axisymmetric:
+            across, (x, _, z) = self.displacements, np.asarray(self.points).T
+            radius = np.hypot(x, z)
+            outward = np.stack([x, z], axis=1) / np.where(radius == 0, 1.0, radius)[:, None]
+            places = np.column_stack([radius, places[:, 1]])
+            moves = np.column_stack([np.sum(outward * across[:, [0, 2]], axis=1), moves[:, 1]])
+        tree = cKDTree(mesh.points)
+        distance, nearest = tree.query(places)
+        ours = distance <= _near(mesh)
+        count = np.bincount(nearest[ours], minlength=len(mesh.points)).astype(np.float64)
+        shared = tree.query(mesh.points, k=2)[0][:, 1] <= _near(mesh)
+        found, known = np.full(mesh.points.shape, np.nan), (count > 0) & ~shared
+        for k in range(d):
+            sums = np.bincount(nearest[ours], moves[ours, k], minlength=len(mesh.points))
+            found[known, k] = sums[known] / count[known]
+        return found
+
+
+def _near(mesh: BodyMesh) -> float:
+    return _SAME_PLACE * float(np.max(np.ptp(mesh.points, axis=0)))
+
+
+def _absent(mesh: BodyMesh, found: Floats) -> int:
+    """Number of nodes without displacements, if they are more than half of all; else 0."""
+    corners = np.unique(mesh.cells)
+    absent = int(np.sum(np.isnan(found[corners, 0])))
+    return absent if 2 * absent > len(corners) else 0
 
 
 def read_results(path: str | os.PathLike[str]) -> list[NodalResult]:

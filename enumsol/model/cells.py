@@ -66,7 +66,7 @@ class CellKind:
 
     @cached_property
     def _coefficients(self) -> Floats:
-        """Of the monomials in the shape functions, (n, n): whole numbers for all kinds here."""
+        """Coefficients of the monomials in the shape functions, (n, n): whole numbers for all kinds here."""
         inverse: Floats = np.linalg.inv(np.prod(self.places[:, None] ** self.powers, axis=2))
         return np.round(inverse)
 

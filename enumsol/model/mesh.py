@@ -6,7 +6,6 @@ from functools import cached_property
 
 import numpy as np
 import scipy.sparse as sp
-from scipy.sparse.csgraph import connected_components
 
 from enumsol.errors import InvalidArgumentError, InvalidProblemError
 from enumsol.model.cells import numbers_of_nodes
@@ -176,6 +175,8 @@ class BodyMesh(Immutable):
         others = np.setdiff1d(np.arange(motion.shape[1]), columns)
         if not len(others):
             return own
+        from scipy.sparse.csgraph import connected_components  # scipy's solvers come with it
+
         part = sp.csc_array(motion)[:, others]
         # where they are coupled, as motions of one rigid part, by their pseudoinverse
         count, of = connected_components(part.T @ part, directed=False)

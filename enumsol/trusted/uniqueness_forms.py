@@ -332,7 +332,7 @@ class RootForm:
         return bool(within and lacking * (2.0 * pushed / steep) ** 2 * SAFE * SAFE < self.least)
 
     def _slopes(self, rows: Ball) -> tuple[float, float]:
-        """gamma, or 0, and Gamma of theory, Theorem 14.11: rows (w - w*) are at least gamma |e| - Gamma |d|."""
+        """gamma, or 0, and Gamma (theory, section 14.11): rows (w - w*) are at least gamma |e| - Gamma |d|."""
         moved = rows @ self.G.T
         square = least_eigenvalue((moved.T @ moved).symmetric)
         return float(np.sqrt(max(square, 0.0))) / SAFE, float(upper_norm(_sizes(rows @ self.S)))

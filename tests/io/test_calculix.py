@@ -10,6 +10,7 @@ import pytest
 import enumsol
 from enumsol import fem
 from enumsol.auditing.results import compare_result
+from enumsol.io.calculix import NodalResult
 from tests.helpers.refusals import bad_argument
 
 HERE = Path(__file__).parent / "calculix"
@@ -143,3 +144,37 @@ def test_wrong_names_and_meshes_are_refused(tmp_path):
 
 def without_mesh():
     return enumsol.ContactProblem([[1, 0], [0, 1]], [[1, 0]], [[0, 1]], [1, 1])
+
+
+def test_nodes_that_share_a_position_are_told_by_their_numbers_only():
+    """Two squares one on the other: by positions the nodes between them are not known, by numbers all are."""
+    mesh = enumsol.BodyMesh(
+        [[0, 0], [1, 0], [1, 1], [0, 1], [0, 1], [1, 1], [1, 2], [0, 2]], [[0, 1, 2, 3], [4, 5, 6, 7]], np.eye(16)
+    )
+    moves = np.arange(24.0).reshape(8, 3)
+    points = np.pad(mesh.points, ((0, 0), (0, 1)))
+    result = NodalResult(1.0, np.arange(11, 19), moves, points)
+    by_number = result.on(mesh, [*range(11, 19)])
+    np.testing.assert_array_equal(by_number, moves[:, :2])
+    by_place = result.on(mesh)
+    assert np.flatnonzero(np.isnan(by_place[:, 0])).tolist() == [2, 3, 4, 5]
+    np.testing.assert_array_equal(by_place[[0, 1, 6, 7]], moves[[0, 1, 6, 7], :2])
+    # numbers of another mesh are not believed
+    wrong = result.on(mesh, [*range(18, 10, -1)])
+    assert np.isnan(wrong[2, 0])
+    dat = NodalResult(1.0, np.arange(11, 19), moves, None)
+    np.testing.assert_array_equal(dat.on(mesh, [*range(11, 19)]), moves[:, :2])
+
+
+def test_a_layer_of_solids_is_the_plane_body_and_a_slice_the_axisymmetric_one():
+    mesh = enumsol.BodyMesh([[1, 0], [2, 0], [2, 1], [1, 1]], [[0, 1, 2, 3]], np.eye(8))
+    plane = np.array([[0.1, 0.2], [0.3, 0.4], [0.5, 0.6], [0.7, 0.8]])
+    layer = np.array([[*at, z] for at in mesh.points for z in (-0.5, 0.5)])
+    moves = np.array([[*move, z] for move in plane for z in (0.01, -0.01)])
+    result = NodalResult(1.0, np.arange(101, 109), moves, layer)
+    np.testing.assert_allclose(result.on(mesh, [1, 2, 3, 4]), plane)
+    angle = np.radians([-1.0, 1.0])
+    turned = np.array([[r * np.cos(a), y, r * np.sin(a)] for r, y in mesh.points for a in angle])
+    moved = np.array([[u * np.cos(a), v, u * np.sin(a)] for u, v in plane for a in angle])
+    slice_of = NodalResult(1.0, np.arange(101, 109), moved, turned)
+    np.testing.assert_allclose(slice_of.on(mesh, axisymmetric=True), plane)

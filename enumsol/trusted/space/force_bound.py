@@ -60,7 +60,7 @@ class ForceBound:
         root: tuple[Ball, Ball],
         rigid: Floats,
     ) -> Self | None:
-        """None where no bound is proven (theory, Theorem 14.13).
+        """None where no bound is proven (theory, section 14.15).
 
         Parameters
         ----------

@@ -559,7 +559,7 @@ class LeafReference(RootReference[Row]):
         return SpaceWeights.of(self.system, numbers) if turns.shape == (m - p,) else None
 
     def is_sole(self, turns: Floats, reach: Floats) -> bool:
-        """True if this is the only root with |q| within reach, as what is in contact sticks (theory, Theorem 14.14).
+        """True if this is the only root with |q| within reach, as what is in contact sticks (theory, section 14.15).
 
         Parameters
         ----------

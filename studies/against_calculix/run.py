@@ -1,0 +1,107 @@
+"""Do the displacements of CalculiX, with its penalties, and of enumsol converge to each other on the same decks?
+
+Twelve decks, one for each type of element: a block that is pressed on a slab and pushed along it, in the plane and in
+3D, and a ring with a press fit on a shaft and on a cone, axisymmetric. Both programs read the same file, on meshes that
+are refined twice. CalculiX takes contact from surface to surface with a penalty, and enumsol from node to surface,
+exactly; friction is Coulomb's in both, with a stiffness of stick in CalculiX.
+
+Read ``displacements``: the largest difference of the displacement of a node, in parts of the largest displacement; and
+``forces``: the difference of the total contact force on the slab or the shaft (axisymmetric: along the axis), in parts
+of its size. They should fall with the size of the cells, down to what the penalty leaves. ``roots`` is the number of
+equilibria, all proven; ``audit`` whether the result of CalculiX was recognised as one of them. Needs CalculiX
+(``ccx``); without it its columns are empty.
+"""
+
+from __future__ import annotations
+
+import shutil
+import subprocess
+import tempfile
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+import enumsol
+from against_calculix.decks import CASES, SOLID
+from enumsol.model.shapes import row_frames
+
+if TYPE_CHECKING:
+    from shared.results import Run
+
+ABSENT = "CalculiX is not installed: its results are left out"
+#: Cells along the block.
+PLANE_SIZES, SOLID_SIZES = (2, 4, 8), (2, 4, 6)
+
+
+def compared(name, cells, folder):
+    """One row of a deck."""
+    make, kind = CASES[name]
+    file = Path(folder) / f"{name.replace(' ', '_')}_{cells}.inp"
+    file.write_text(make(kind, cells))
+    model = enumsol.read_deck(file)
+    problem = model.problem()
+    roots = enumsol.enumerate_roots(problem, 0)
+    row = {
+        "deck": name,
+        "cells": cells,
+        "n": problem.n,
+        "p": problem.p,
+        "roots": len(roots),
+        "complete": roots.complete,
+    }
+    if shutil.which("ccx") is None:
+        return row | {"displacements": "-", "forces": "-", "audit": "-"}
+    done = subprocess.run(["ccx", file.stem], cwd=folder, capture_output=True, text=True, check=False)
+    if "Job finished" not in done.stdout or "ERROR" in done.stdout:
+        return row | {"displacements": "-", "forces": "-", "audit": "CalculiX found no result"}
+    result = enumsol.read_results(file.with_suffix(".dat"))[-1]
+    audit = enumsol.compare_result(problem, roots, result.on(problem.mesh, model.mesh.node_labels))
+    number = min(audit.distances, key=audit.distances.__getitem__)
+    ours, theirs = total(problem, roots[number[1]]), reaction(file.with_suffix(".dat"), problem.mesh.points.shape[1])
+    if "CAX" in name:
+        ours, theirs = ours[1:], theirs[1:]
+    return row | {
+        "displacements": audit.distances[number],
+        "forces": float(np.linalg.norm(ours + theirs) / np.linalg.norm(ours)),
+        "audit": audit.found is not None,
+    }
+
+
+def total(problem, root):
+    """The total contact force on the second body, (d,)."""
+    frames = row_frames(problem)  # normals out of the first body, and tangents
+    forces = np.column_stack([root.lambda_n, root.lambda_t])
+    return np.einsum("pk,pkd->d", forces, frames)
+
+
+def reaction(file, d):
+    """The total reaction that CalculiX prints last, (d,)."""
+    lines = file.read_text().splitlines()
+    last = max(k for k, line in enumerate(lines) if "total force" in line)
+    return np.array([float(word) for word in lines[last + 2].split()[:d]])
+
+
+def conclusion(rows):
+    """How the differences fall from mesh to mesh."""
+    if shutil.which("ccx") is None:
+        return ABSENT
+    by_deck = {}
+    for row in rows:
+        by_deck.setdefault(row["deck"], []).append(row["displacements"])
+    falls = [name for name, values in by_deck.items() if values[-1] < values[0]]
+    last = [values[-1] for values in by_deck.values()]
+    return (
+        f"Conclusion: on the finest meshes the displacements differ by {100 * min(last):.2g} to {100 * max(last):.2g} "
+        f"% of the largest; the difference falls with the size of the cells on {len(falls)} of {len(by_deck)} decks."
+    )
+
+
+def main(run: Run) -> None:
+    with tempfile.TemporaryDirectory() as folder:
+        rows = [
+            compared(name, cells, folder)
+            for name, (_, kind) in CASES.items()
+            for cells in (SOLID_SIZES if kind in SOLID else PLANE_SIZES)[: 1 if run.smoke else None]
+        ]
+    run.table("against_calculix", rows, conclusion(rows))
