@@ -61,9 +61,12 @@ def read_deck(path: str | os.PathLike[str], *, ignore: Collection[str] = ()) -> 
     Examples
     --------
     >>> import enumsol
-    >>> model = enumsol.read_deck("block_on_base.inp")  # doctest: +SKIP
-    >>> roots = enumsol.enumerate_roots(model.problem(step=1), 0)  # doctest: +SKIP
-    >>> history = enumsol.histories(model.problem(step=1), model.steps())  # doctest: +SKIP
+    >>> enumsol.read_deck("model.inp")
+    Traceback (most recent call last):
+        ...
+    enumsol.errors.InvalidProblemError: model.inp: there is no such file; expected a deck of CalculiX or Abaqus
+
+    A deck that is read is shown with `DeckModel`.
     """
     place = file_path(path, "path")
     try:
@@ -74,7 +77,7 @@ def read_deck(path: str | os.PathLike[str], *, ignore: Collection[str] = ()) -> 
 
 @dataclass(eq=False)
 class DeckModel:
-    """Model that a deck describes; ``print(model)`` says what became of its cards.
+    """Model that a deck describes, see `read_deck`; ``print(model)`` says what became of its cards.
 
     Attributes
     ----------
@@ -82,6 +85,54 @@ class DeckModel:
         The plain description.
     ignored : tuple of str
         What was left out though it may change the answer.
+
+    Examples
+    --------
+    >>> import enumsol, pathlib
+    >>> _ = pathlib.Path("press.inp").write_text('''*NODE
+    ... 1, 0, 0
+    ... 2, 1, 0
+    ... 3, 1, 1
+    ... 4, 0, 1
+    ... 5, 0, 1
+    ... 6, 1, 1
+    ... 7, 1, 2
+    ... 8, 0, 2
+    ... *ELEMENT, TYPE=CPE4, ELSET=BOTH
+    ... 1, 1, 2, 3, 4
+    ... 2, 5, 6, 7, 8
+    ... *SURFACE, NAME=UNDER
+    ... 2, S1
+    ... *SURFACE, NAME=ON
+    ... 1, S3
+    ... *MATERIAL, NAME=RUBBER
+    ... *ELASTIC
+    ... 10, 0.3
+    ... *SOLID SECTION, ELSET=BOTH, MATERIAL=RUBBER
+    ... *SURFACE INTERACTION, NAME=DRY
+    ... *FRICTION
+    ... 0.3
+    ... *CONTACT PAIR, INTERACTION=DRY
+    ... UNDER, ON
+    ... *BOUNDARY
+    ... 1, 1, 2
+    ... 2, 1, 2
+    ... *STEP
+    ... *STATIC
+    ... *BOUNDARY
+    ... 7, 1, 2, -0.01
+    ... 8, 1, 2, -0.01
+    ... *END STEP
+    ... ''')
+    >>> model = enumsol.read_deck("press.inp")
+    >>> print(model)
+    press.inp line 1          *NODE                 8 nodes
+    ...
+    press.inp line 22         *FRICTION             friction 0.3
+    ...
+    >>> roots = enumsol.enumerate_roots(model.problem(), 0)
+    >>> [str(status) for status in roots[0].statuses], roots.complete
+    (['stick', 'stick'], True)
     """
 
     deck: Deck
