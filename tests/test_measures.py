@@ -11,12 +11,12 @@ from documents import ROOT
 
 #: A change that lowers a measure lowers its bound; one that has to raise it says why in its commit.
 BOUNDS = {
-    "code lines": 47_137,
-    "classes": 584,
+    "code lines": 51_506,
+    "classes": 627,
     "kinds of records": 20,
-    "parameters annotated Any": 94,
-    "files": 300,
-    "docstrings that begin with a pronoun": 25,
+    "parameters annotated Any": 116,
+    "files": 333,
+    "docstrings that begin with a pronoun": 26,
     "class names used twice or more": 9,
 }
 _NO_CODE = (tokenize.COMMENT, tokenize.NL, tokenize.NEWLINE, tokenize.INDENT, tokenize.DEDENT, tokenize.ENDMARKER)
