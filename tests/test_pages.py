@@ -25,10 +25,7 @@ def page(name, *files):
     return followed
 
 
-NAMES = (
-    *("branches", "collection", "command_line", "gallery", "histories", "results", "stability"),
-    "three_dimensions",
-)
+NAMES = ("branches", "collection", "command_line", "gallery", "histories", "results", "stability", "three_dimensions")
 branches, collection, command_line, gallery, histories, results, stability, three_dimensions = map(page, NAMES)
 tutorial = page("tutorial")
 WEDGE = ROOT / "studies" / "against_calculix"
