@@ -53,6 +53,7 @@ CONCLUSIONS = {
 #: Studies that take more than two and a half seconds at their smoke size, but for the examples of the paper.
 LONG = (
     "accuracy_vs_speed",
+    "against_calculix",
     "branching_rule",
     "certification_cost",
     "condensation_cost",
