@@ -66,6 +66,15 @@ def test_a_pressed_block(tmp_path, elastic, orientation, degrees):
     np.testing.assert_allclose(left[0] - u[6, 0], -PRESSURE * 2 * shear, rtol=1e-10, atol=1e-14)
 
 
+def test_all_cells_may_be_orthotropic(tmp_path):
+    """The lower block by the isotropic law as an orthotropic one moves as the isotropic one."""
+    plain = "*ELASTIC\n300., 0.2\n"
+    same = "*ELASTIC, TYPE=ENGINEERING CONSTANTS\n300., 300., 300., 0.2, 0.2, 0.2, 125., 125.,\n125.\n"
+    text = text_of()
+    assert plain in text
+    np.testing.assert_allclose(moved(tmp_path, text.replace(plain, same)), moved(tmp_path, text), rtol=0, atol=1e-13)
+
+
 def test_an_orientation_of_an_isotropic_material_changes_nothing(tmp_path):
     plain = text_of("*ELASTIC\n100., 0.3\n")
     turned = text_of("*ELASTIC\n100., 0.3\n", "*ORIENTATION, NAME=GRAIN\n1., 1., 0., 0., 1., 0.\n")
