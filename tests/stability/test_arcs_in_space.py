@@ -10,8 +10,7 @@ import enumsol
 from enumsol.arithmetic.balls import Ball
 from enumsol.branches.space.slip_directions import SlipDirections
 from enumsol.trusted.motions_of_body import BodyMotions, reciprocal
-from enumsol.trusted.status_rows import OPEN as NO_FORCE
-from enumsol.trusted.status_rows import STICK
+from enumsol.trusted.status_rows import OPEN as NO_FORCE, STICK
 
 QUIET, AWAY, OPEN = "does not run away", "runs away", "undecided"
 #: Stiffness and mass of a node: along both tangents, and of either tangent with the normal.
