@@ -39,6 +39,7 @@ harmless("all equilibria at the end of a step are found, without increments", *(
 ))  # fmt: skip
 harmless("it asks for output", "FILTER")
 harmless("the analysis is static", "DAMPING", "GLOBAL DAMPING", "MODAL DAMPING")
+harmless("it is of reduced integration, in place of which elements are integrated in full", "SECTION CONTROLS")
 harmless("no heat is conducted", *(
     "CONDUCTIVITY", "SPECIFIC HEAT", "LATENT HEAT", "PHYSICAL CONSTANTS", "GAP CONDUCTANCE", "GAP HEAT GENERATION",
 ))  # fmt: skip
@@ -179,8 +180,9 @@ def initial_conditions(reading: Reading, given: Card) -> str:
 def amplitude(reading: Reading, given: Card) -> str:
     """*AMPLITUDE: factors over time, of which the one at the end of a step counts."""
     name = given.needed("NAME")
-    if given.name_of("DEFINITION") not in ("", "TABULAR") or given.name_of("VALUE") not in ("", "RELATIVE"):
-        raise given.refused("is no table of factors; expected DEFINITION=TABULAR and VALUE=RELATIVE")
+    kind = given.name_of("DEFINITION").replace(" ", "")
+    if kind not in ("", "TABULAR", "SMOOTHSTEP") or given.name_of("VALUE") not in ("", "RELATIVE"):
+        raise given.refused("is no table of factors; expected DEFINITION=TABULAR or SMOOTH STEP, and VALUE=RELATIVE")
     if given.options.keys() & {"USER", "SHIFTX", "SHIFTY"}:
         raise given.refused("has USER, SHIFTX or SHIFTY; expected a plain table of times and factors")
     numbers = [given.number(entry, row) for row, entries in given.rows() for entry in entries]
@@ -188,7 +190,7 @@ def amplitude(reading: Reading, given: Card) -> str:
     if len(times) != len(factors) or not times or any(b < a for a, b in pairwise(times)):
         raise given.refused("has no pairs of rising times and factors; expected time, factor, time, factor, ...")
     total = given.name_of("TIME").replace(" ", "") == "TOTALTIME"
-    reading.analysis.amplitudes[name] = Amplitude(tuple(times), tuple(factors), total)
+    reading.analysis.amplitudes[name] = Amplitude(tuple(times), tuple(factors), total, kind == "SMOOTHSTEP")
     return f"factors of {'all steps' if total else 'a step'} up to time {times[-1]:g}, where it is {factors[-1]:g}"
 
 

@@ -48,15 +48,24 @@ class Amplitude:
     times, factors : (k,) arrays
     total : bool
         Whether times count from the beginning of the first step.
+    smooth : bool
+        Whether it leaves each of the times and reaches the next one without slope and curvature (SMOOTH STEP).
     """
 
     times: tuple[float, ...]
     factors: tuple[float, ...]
     total: bool = False
+    smooth: bool = False
 
     def at(self, time: float) -> float:
         """The factor at a time; before the first and after the last one it stays what it is there."""
-        return float(np.interp(time, self.times, self.factors))
+        if not self.smooth:
+            return float(np.interp(time, self.times, self.factors))
+        number = float(np.interp(time, self.times, range(len(self.times))))
+        part = number % 1.0
+        return float(
+            np.interp(number - part + part**3 * (10 - 15 * part + 6 * part**2), range(len(self.factors)), self.factors)
+        )
 
 
 @dataclass

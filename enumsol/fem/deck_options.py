@@ -13,7 +13,7 @@ from enumsol.errors import InvalidArgumentError
 
 if TYPE_CHECKING:
     from enumsol.decks.cards import DeckPlace
-    from enumsol.decks.model import Deck, Section
+    from enumsol.decks.model import Deck, Material, Section
     from enumsol.decks.states import DeckState
     from enumsol.decks.steps import ContactPair
     from enumsol.fem.deck_joints import DeckJoints
@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from enumsol.support.array_types import Floats, Integers
 
 #: Options that are given by sets of elements.
-_BY_MATERIAL = ("young", "poisson", "density", "expansion", "thickness")
+_BY_MATERIAL = ("young", "poisson", "orthotropic", "orientation", "density", "expansion", "thickness")
 #: Families of plane elements, and what `mesh_problem` calls them.
 _PLANES = {"plane strain": "strain", "plane stress": "stress", "axisymmetric": "axisymmetric"}
 
@@ -41,18 +41,21 @@ def shared(deck: Deck, parts: DeckParts) -> dict[str, Any]:
 
 
 def _materials(deck: Deck, parts: DeckParts) -> dict[str, Any]:
-    """Young's modulus, Poisson's ratio, density and thickness by sets of elements, and the plane."""
+    """Elastic constants and their axes, density and thickness by sets of elements, and the plane."""
     found: dict[str, dict[str, Any]] = {name: {} for name in _BY_MATERIAL}
     for section, rows in _sections(deck):
         name = parts.elements(rows, section.elements)
         material = deck.materials[section.material]
-        if material.elastic != "ISO":
-            kind = f"the law {material.elastic}" if material.elastic else "no *ELASTIC"
+        if not material.elastic:
             raise InvalidArgumentError(
-                f"{material.elastic_place or material.place}: *MATERIAL {material.name} has {kind}; expected an "
-                "isotropic elastic law"
+                f"{material.place}: *MATERIAL {material.name} has no *ELASTIC; expected an elastic law"
             )
-        found["young"][name], found["poisson"][name] = map(float, material.constants)
+        if material.elastic == "ISO":
+            found["young"][name], found["poisson"][name] = map(float, material.constants)
+        else:
+            found["orthotropic"][name] = _engineering_constants(material)
+            if section.orientation:
+                found["orientation"][name] = _axes(deck, section)
         expansion = () if material.expansion is None else material.expansion.tolist()
         if len(expansion) > 1:
             raise InvalidArgumentError(
@@ -63,17 +66,58 @@ def _materials(deck: Deck, parts: DeckParts) -> dict[str, Any]:
         if material.density:
             found["density"][name] = material.density
         found["thickness"][name] = section.thickness or 1.0
-    options: dict[str, Any] = {name: found[name] for name in ("young", "poisson")}
+    options: dict[str, Any] = {name: found[name] for name in _BY_MATERIAL[:4] if found[name]}
     warmed = any(act.card == "TEMPERATURE" for step in deck.analysis.steps for act in step.acts)
     if warmed and any(found["expansion"].values()):
         options["expansion"] = found["expansion"]
-    if found["density"].keys() == found["young"].keys():
+    if found["density"].keys() == found["expansion"].keys():
         options["density"] = found["density"]
     if is_plane(deck):
         options["plane"] = _planes(deck, parts)
     if set(found["thickness"].values()) != {1.0} and options.get("plane", "axisymmetric") != "axisymmetric":
         options["thickness"] = found["thickness"]
     return options
+
+
+def _engineering_constants(material: Material) -> list[float]:
+    """E1, E2, E3, nu12, nu13, nu23, G12, G13, G23 of an orthotropic material."""
+    if material.elastic == "ENGINEERING CONSTANTS":
+        return list(map(float, material.constants))
+    d11, d12, d22, d13, d23, d33, *shear = map(float, material.constants)
+    moduli = np.array([[d11, d12, d13], [d12, d22, d23], [d13, d23, d33]])
+    if min(np.linalg.eigvalsh(moduli)) <= 0 or min(shear) <= 0:
+        raise InvalidArgumentError(
+            f"{material.elastic_place}: *ELASTIC of {material.name} gives no positive energy for some strains; "
+            "expected D1111, D1122, D2222, D1133, D2233, D3333, D1212, D1313, D2323 that do"
+        )
+    flexible = np.linalg.inv(moduli)
+    young = 1 / np.diag(flexible)
+    poisson = [-flexible[i, j] * young[i] for i, j in ((0, 1), (0, 2), (1, 2))]
+    return [*map(float, young), *map(float, poisson), *shear]
+
+
+def _axes(deck: Deck, section: Section) -> list[float]:
+    """Directions of the first two axes of the material of a section."""
+    if section.orientation not in deck.orientations:
+        known = ", ".join(deck.orientations) or "none"
+        raise InvalidArgumentError(
+            f"{section.place}: *SOLID SECTION names the orientation {section.orientation}; expected one of {known}"
+        )
+    given = deck.orientations[section.orientation]
+    if given.system != "RECTANGULAR":
+        raise InvalidArgumentError(
+            f"{given.place}: *ORIENTATION is {given.system.lower()}, with axes that turn within an element; expected "
+            "SYSTEM=RECTANGULAR for an orthotropic material"
+        )
+    first, second = given.points - given.origin
+    third = np.cross(first, second)
+    axes = np.array([own / np.linalg.norm(own) for own in (first, np.cross(third, first), third)])
+    if given.rotation:
+        k, angle = given.rotation[0] - 1, np.radians(given.rotation[1])
+        one, two = axes[(k + 1) % 3].copy(), axes[(k + 2) % 3].copy()
+        axes[(k + 1) % 3] = np.cos(angle) * one + np.sin(angle) * two
+        axes[(k + 2) % 3] = np.cos(angle) * two - np.sin(angle) * one
+    return [*map(float, axes[0]), *map(float, axes[1])]
 
 
 def _sections(deck: Deck) -> list[tuple[Section, Integers]]:
@@ -93,10 +137,6 @@ def _sections(deck: Deck) -> list[tuple[Section, Integers]]:
             known = ", ".join(deck.materials) or "none"
             raise InvalidArgumentError(
                 f"{section.place}: *SOLID SECTION names the material {section.material}; expected one of {known}"
-            )
-        if section.orientation:
-            raise InvalidArgumentError(
-                f"{section.place}: *SOLID SECTION has an ORIENTATION, which is not read; expected an isotropic material"
             )
         if not np.all(without[rows]):
             again = deck.element_name(int(rows[np.argmin(without[rows])]))

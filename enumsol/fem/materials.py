@@ -366,7 +366,7 @@ def _of_cells(
 
     ``needed`` says which cells need one; others may have None.
     """
-    if value is None and needed is False:
+    if value is None and not np.any(needed):
         return None
     if not isinstance(value, Mapping):
         return read(value, name)

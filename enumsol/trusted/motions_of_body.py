@@ -171,7 +171,7 @@ class BodyMotions:
             columns += [_column(len(rows), {place[row]: Ball.exact(np.array(1.0))}) for row in own]
             signed += [True, *(False for _ in own)]
             # along axes with friction
-            smaller = min((f[i] for f in F), key=lambda f: float(f.mid) or np.inf)
+            smaller = min((f[i] for f in F), key=lambda f: float(f.low) if f.mid > 0 else np.inf)
             touching.append(Touching(start, tuple(range(start + 1, start + 1 + len(own))), smaller))
         motions = Motions(
             _stacked(columns, len(rows)),
@@ -299,13 +299,14 @@ def direction(v: Ball) -> tuple[Ball, Ball]:
 
 
 def reciprocal(F: Ball) -> Ball:
-    """1 / F; of no friction at all zero, since no force is along that axis."""
-    mid = float(F.mid)
-    return (
-        Ball.exact(np.array(0.0))
-        if mid == 0
-        else Ball(np.array(1 / mid), np.array((2 * float(F.rad) / mid + 2 * UNIT) / mid))
-    )
+    """1 / F for all F in a ball; of no friction at all zero, since no force is along that axis."""
+    mid, rad = float(F.mid), float(F.rad)
+    if mid == 0 and rad == 0:
+        return Ball.exact(np.array(0.0))
+    if not rad < mid:
+        return Ball(np.array(0.0), np.array(np.inf))
+    # 1 / (F - r) - 1 / F = (r / (F - r)) / F
+    return Ball(np.array(1 / mid), np.array((rad / (mid - rad) * SAFE + 2 * UNIT) / mid * SAFE + TINY))
 
 
 def _stacked(columns: list[Ball], size: int) -> Ball:

@@ -64,6 +64,11 @@ RIGHT = {
         steps=step("*BOUNDARY\nTOP, 2, 2, -0.01\n*DLOAD, AMPLITUDE=RISE\n12, P2, 2.\n")), {}),
     "an amplitude of a displacement over a longer step": (deck(materials=MATERIALS + "*AMPLITUDE, NAME=RISE\n0., 0., 4., 1.\n",
         steps="*STEP\n*STATIC\n0.1, 2.\n*BOUNDARY, AMPLITUDE=RISE\nTOP, 2, 2, -0.02\n" + PUSH + "*END STEP\n"), {}),
+    "a smooth amplitude": (deck(materials=MATERIALS + "*Section Controls, name=EC-1, hourglass=ENHANCED\n1., 1., 1.\n"
+        "*AMPLITUDE, NAME=RISE, DEFINITION=SMOOTH STEP\n0., 0., 4., 1.\n",
+        steps=step("*BOUNDARY\nTOP, 2, 2, -0.01\n*DLOAD, AMPLITUDE=RISE\n12, P2, 10.\n")), {"pressure": {"RIGHT": 1.03515625}}),
+    "a smooth amplitude at the end of a time": (deck(materials=MATERIALS + "*AMPLITUDE, NAME=RISE, DEFINITION=SMOOTH STEP\n0., 0., 0.5, 0.1, 1., 2.\n",
+        steps=step("*BOUNDARY\nTOP, 2, 2, -0.01\n*DLOAD, AMPLITUDE=RISE\n12, P2, 1.\n")), {}),
     "plane stress and a thickness": (deck(type="CPS4", materials=MATERIALS.replace("MATERIAL=SOFT\n*SOLID", "MATERIAL=SOFT\n0.5,\n*SOLID").replace("MATERIAL=HARD\n", "MATERIAL=HARD\n0.5\n")),
         {"plane": "stress", "thickness": 0.5}),
     "no friction": (deck(contact="*SURFACE INTERACTION, NAME=DRY\n*SURFACE BEHAVIOR, PRESSURE-OVERCLOSURE=HARD\n*CONTACT PAIR, INTERACTION=DRY\nUNDER, ON\n"), {"friction": 0.0}),

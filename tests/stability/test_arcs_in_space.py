@@ -7,7 +7,10 @@ import pytest
 from growing_motions import of_a_root
 
 import enumsol
+from enumsol.arithmetic.balls import Ball
 from enumsol.branches.space.slip_directions import SlipDirections
+from enumsol.trusted.motions_of_body import BodyMotions, reciprocal
+from enumsol.trusted.status_rows import OPEN as NO_FORCE, STICK
 
 QUIET, AWAY, OPEN = "does not run away", "runs away", "undecided"
 #: Stiffness and mass of a node: along both tangents, and of either tangent with the normal.
@@ -117,6 +120,24 @@ def test_a_wedge_from_a_fold_to_the_end_of_the_interval(tmp_path):
         [(span.verdict, span.high) for span in spans] for spans in graph.stability()
     ]
     assert not loaded.verdicts_read
+
+
+@pytest.mark.parametrize("rad", [0.0, 1e-12, 0.2, 0.4949, 0.495])
+def test_a_reciprocal_of_friction_is_enclosed_however_wide_its_ball_is(rad):
+    found = reciprocal(Ball(np.array(0.505), np.array(rad)))
+    for F in (0.505 - rad, 0.505, 0.505 + rad):
+        assert found.mid - found.rad <= 1 / F <= found.mid + found.rad
+    for low in (0.0, -0.1):
+        assert not reciprocal(Ball(np.array(0.5), np.array(0.5 - low))).finite
+
+
+def test_a_node_that_touches_has_the_least_friction_of_both_axes():
+    """Also where the axis whose middle is larger may have the smaller coefficient."""
+    body = BodyMotions(one_node([0, 0, 0], [0, 0, 0], 0.5), at_rest=True)
+    F = [Ball(np.array([mid]), np.array([rad])) for mid, rad in ((0.5, 0.01), (0.51, 0.4))]
+    for axes in (F, F[::-1]):
+        (setting,) = body.settings([{NO_FORCE, STICK}], axes, every=True)
+        assert setting.motions.touching[0].F.low <= 0.11 + 1e-12
 
 
 def random_body(rng):

@@ -14,8 +14,10 @@ from rational_forms import Refused
 from space_judge import judge_records
 
 import enumsol
+from enumsol.arithmetic.balls import Ball
 from enumsol.search.space.sole_roots import sole_turns
 from enumsol.trusted.space.force_bound import ForceBound
+from enumsol.trusted.uniqueness_forms import Multipliers
 
 
 def scaled(reference, force, tau, w):
@@ -80,6 +82,41 @@ def test_all_roots_are_within_the_bound_and_none_is_sole_beside_others():
     assert counts["several"] > some(1, of=50)
     assert counts["inside"] > some(60, of=3000)
     assert counts["sole"] > some(5, of=200)
+
+
+def farthest_in_bound(seed):
+    """How far the bound reaches for what (14.20) allows, as shares: any numbers stand for those of a root."""
+    rng = np.random.default_rng(seed)
+    p = int(rng.integers(2, 5))
+    m, r = 3 * p, int(rng.integers(1, 7 if p > 2 else 6))
+    X, G, a, D = rng.normal(size=(m, m)), rng.normal(size=(r, m)), np.zeros(m), np.eye(m)
+    S, force, w, rigid = X @ X.T / m + np.eye(m), rng.normal(size=m), rng.normal(size=m), 0.3 * rng.random(r)
+    w[:p] = 0.0
+    places, unit, theta = np.arange(p, m).reshape(p, 2), 2.0 ** rng.integers(-2, 3, (p, 2)), rng.normal(size=(p, 2))
+    turn = theta * (rng.random(p) / np.linalg.norm(theta, axis=1))[:, None] / unit
+    for i, t in enumerate(places):
+        a[t], D[t, i] = force[t] - turn[i] * force[i], -turn[i]
+    none, one = Ball.exact(np.zeros((p, 2))), np.ones(p)
+    numbers = Multipliers(places, one, one, Ball.exact(turn), none, unit)
+    found = ForceBound.of((Ball.exact(S), Ball.exact(G)), numbers, (Ball.exact(force), Ball.exact(w)), rigid)
+    if found is None:
+        return []
+    balanced = np.linalg.svd(G)[2][r:].T
+
+    def allowed(d):
+        linear = d @ (S @ a - D.T @ w) - a @ w
+        return d @ D.T @ S @ d + linear <= 2 * rigid @ np.abs(G @ (D @ d + a))
+
+    ways = [balanced @ rng.normal(size=m - r) for _ in range(20)]
+    d = [x * way for way in ways for x in np.geomspace(1e-2, 1e3, 120) if allowed(x * way)]
+    return [np.linalg.norm(np.linalg.solve(found.T, each - found.centre)) / found.reach for each in d]
+
+
+def test_the_bound_holds_all_that_the_inequality_of_theory_allows():
+    shares = [share for seed in range(80) for share in farthest_in_bound(seed)]
+    assert len(shares) > 1000
+    # with another sign of G a it is exceeded
+    assert 0.9 < max(shares) <= 1.0
 
 
 @pytest.fixture(scope="module")

@@ -39,7 +39,7 @@ class ForceBound:
     least : float
         The form of these multipliers with |G d|^2 is at least so many |d|^2.
     left : float
-        e'G D d is at most so many |e| |d|.
+        ||R||: e'G D d is at most so many |e| |d|.
     """
 
     force: Ball
@@ -81,7 +81,8 @@ class ForceBound:
         P = (numbers.form(S) + weighted.T @ weighted).symmetric
         b = (S @ off[:, None] - numbers.form(slip[:, None]))[:, 0]
         const = (off[None] @ slip[:, None])[0, 0]
-        left, pushed = _left(numbers.cross(G, 0.0), G), (G @ off[:, None])[:, 0]
+        # -R and -G a: cross is -G D
+        left, pushed = _left(numbers.cross(G, 0.0), G), (G @ -off[:, None])[:, 0]
         found = _ellipsoid(P, b, const, left, pushed, 2.0 * rigid * SAFE)
         least = least_eigenvalue(P)
         if found is None or not least > 0:
@@ -109,7 +110,7 @@ class ForceBound:
 
 
 def _left(D: Ball, G: Ball) -> Ball:
-    """G D less a combination of the rows of G, which is any: G d = 0."""
+    """D, of the shape of G, less a combination of the rows of G, which is any: G d = 0."""
     part = D.mid @ np.linalg.pinv(G.mid)
     return D - Ball.exact(np.where(np.isfinite(part), part, 0.0)) @ G
 
