@@ -128,7 +128,7 @@ def test_results(results):
 
 @pytest.mark.slow
 def test_reports(command_line):
-    files = {"FILE", "FOLDER", "node.proof", "roots.html", "wedge.html", "wedge.proof"}
+    files = {"FILE", "FOLDER", "node.proof", "roots.html", "shoe.proof", "wedge.html", "wedge.proof"}
     assert {path.name for path in command_line["folder"].iterdir()} == files
 
 

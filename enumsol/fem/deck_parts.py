@@ -34,15 +34,16 @@ class DeckParts:
 
     def nodes(self, rows: Integers, wanted: str) -> str:
         """Name of a set of nodes, the one that is wanted if it has these."""
-        return self._named(self._deck.node_sets, np.unique(rows), wanted, lambda own: own)
+        return self._named("nodes", self._deck.node_sets, np.unique(rows), wanted, lambda own: own)
 
     def elements(self, rows: Integers, wanted: str) -> str:
         """Name of a set of elements."""
-        return self._named(self._deck.element_sets, np.unique(rows), wanted, lambda own: own)
+        return self._named("elements", self._deck.element_sets, np.unique(rows), wanted, lambda own: own)
 
     def faces(self, faces: Integers, wanted: str, place: DeckPlace) -> str:
         """Name of a surface of faces (k, 2)."""
         return self._named(
+            "faces",
             self._deck.surfaces,
             np.unique(faces, axis=0),
             wanted,
@@ -50,8 +51,8 @@ class DeckParts:
             lambda own: own.faces,
         )
 
-    def _named(self, sets: Any, rows: Integers, wanted: str, made: Any, of: Any = lambda own: own) -> str:
-        key = (str(id(sets)), rows.tobytes())
+    def _named(self, kind: str, sets: Any, rows: Integers, wanted: str, made: Any, of: Any = lambda own: own) -> str:
+        key = (kind, rows.tobytes())
         if key in self._names:
             return self._names[key]
         name = wanted

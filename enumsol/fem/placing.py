@@ -34,7 +34,7 @@ def mesh_of(source: object, groups: str | None = None) -> PartedMesh:
         return source
     if not isinstance(source, Mapping):
         return read_mesh(source, groups)
-    if not source or not all(isinstance(name, str) and name for name in source):
+    if not len(source) or not all(isinstance(name, str) and name for name in source):
         raise InvalidArgumentError(f"mesh is {shown(source)}; expected names with their meshes")
     return _together({name: _placed(value, name, groups) for name, value in source.items()})
 

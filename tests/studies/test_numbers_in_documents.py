@@ -211,6 +211,7 @@ WITHOUT_NUMBERS = {
     ("README.md", "same_body_by_other_codes"),
     ("arithmetic.md", "extremes"),
     ("from_a_mesh.md", "same_body_by_other_codes"),
+    ("from_a_deck.md", "against_calculix"),
 }
 
 

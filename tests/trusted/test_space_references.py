@@ -61,7 +61,8 @@ def told(seed):
 
 def said(reference, codes, rng):
     """By which of several attempts the root is said to be the only one below an assignment."""
-    rows, products = proposed(reference, codes)
+    found = proposed(reference, codes)
+    rows, products = found.rows, found.products
     tight = [(GAP, i, 0) for i in range(len(codes))]
     tight += [(kind, i, code - SECTORS) for i, code in enumerate(codes) if code > SECTORS for kind in (LEFT, RIGHT)]
     tight = [row for row in tight if reference.is_tight(codes, row)]
