@@ -53,7 +53,7 @@ def ortho():
     ],
 )
 def test_a_pressed_block(tmp_path, elastic, orientation, degrees):
-    """Compliances in axes turned by an angle as in Jones, Mechanics of composite materials, section 2.8."""
+    """Compliances in axes turned by an angle as in Jones, Mechanics of composite materials."""
     u = moved(tmp_path, text_of(elastic, orientation))
     c, s = np.cos(np.radians(degrees)), np.sin(np.radians(degrees))
     down = s**4 / E1 + c**4 / E2 + (1 / G12 - 2 * N12 / E1) * s**2 * c**2
