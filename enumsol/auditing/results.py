@@ -140,13 +140,11 @@ def compare_result(
     size = float(np.max(np.abs(given[known])))
     solutions = KnownSolutions([at_nodes(root.u) for root in roots], families, each_by_itself=True, otherwise=size)
     distances = solutions.distances(given[known])
-    nearest, distance = solutions.nearest(given[known])
-    clear = (
-        all(distance < 0.5 * solutions.apart(nearest, other) for other in distances if other != nearest)
-        if nearest
-        else False
-    )
-    found = nearest if distance <= limit and clear else None
+    found = min(distances, key=distances.__getitem__, default=None)
+    if found is not None:
+        others = [0.5 * solutions.apart(found, other) for other in distances if other != found]
+        if distances[found] > limit or not all(distances[found] < half for half in others):
+            found = None
     return ResultComparison(distances, found, limit, roots.complete)
 
 

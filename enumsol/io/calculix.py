@@ -37,6 +37,7 @@ _KINDS: dict[str, tuple[int, list[int]]] = {
     "hexahedron27": (4, [*range(12), *range(16, 20), *range(12, 16)]),
     "wedge": (2, [*range(6)]),
     "wedge15": (5, [*range(9), *range(12, 15), *range(9, 12)]),
+    "wedge18": (5, [*range(9), *range(12, 15), *range(9, 12)]),
 }
 #: Components of symmetric tensors as CalculiX orders them, in a tensor by rows.
 _TENSOR = [0, 4, 8, 1, 5, 6]

@@ -3,6 +3,7 @@
 import re
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -11,6 +12,8 @@ import enumsol
 from enumsol import fem
 from enumsol.auditing.results import compare_result
 from enumsol.io.calculix import NodalResult
+from enumsol.model.cells import KINDS
+from tests.helpers.parted_solids import solid
 from tests.helpers.refusals import bad_argument
 
 HERE = Path(__file__).parent / "calculix"
@@ -178,3 +181,47 @@ def test_a_layer_of_solids_is_the_plane_body_and_a_slice_the_axisymmetric_one():
     moved = np.array([[u * np.cos(a), v, u * np.sin(a)] for u, v in plane for a in angle])
     slice_of = NodalResult(1.0, np.arange(101, 109), moved, turned)
     np.testing.assert_allclose(slice_of.on(mesh, axisymmetric=True), plane)
+
+
+@pytest.mark.parametrize("kind", sorted(nodes for dimension, nodes in KINDS if dimension == 3))
+def test_every_kind_of_solid_cell_is_written(tmp_path, kind):
+    data = {"young": 1.0, "poisson": 0.3, "contact": "bottom", "clamp": "left", "load": {"top": (0.0, 0.0, -0.1)}}
+    problem = fem.mesh_problem(solid((2, 1, 1), kind), friction=0.3, **data)
+    free = SimpleNamespace(u=problem.factorization.solve(problem.f), lambda_n=np.zeros(problem.p))
+    free.lambda_t, free.u_n, free.u_t = np.zeros((problem.p, 2)), problem.Bn @ free.u, np.zeros((problem.p, 2))
+    enumsol.write_frd(problem, free, tmp_path / "free.frd")
+    (result,) = enumsol.read_results(tmp_path / "free.frd")
+    moved = problem.mesh.displacements(free.u)
+    written = result.on(problem.mesh)
+    known = np.isfinite(written[:, 0])
+    # CGX has no nodes in the middle of facets and cells
+    assert len(problem.mesh.points) - np.count_nonzero(known) == {18: 9, 27: 13}.get(kind, 0)
+    np.testing.assert_allclose(written[known], moved[known], atol=1e-5 * np.max(np.abs(moved)))
+
+
+@pytest.mark.parametrize(
+    ("kind", "between"),
+    [
+        (10, "01 12 20 03 13 23"),
+        (18, "01 12 20 03 14 25 34 45 53"),
+        (27, "01 12 23 30 04 15 26 37 45 56 67 74"),
+    ],
+)
+def test_nodes_between_corners_are_in_the_order_of_cgx(tmp_path, kind, between):
+    data = {"young": 1.0, "poisson": 0.3, "contact": "bottom", "clamp": "left"}
+    problem = fem.mesh_problem(solid((1, 1, 1), kind), friction=0.3, **data)
+    zero = np.zeros((problem.p, 2))
+    rest = SimpleNamespace(u=np.zeros(problem.n), lambda_n=zero[:, 0], lambda_t=zero, u_n=zero[:, 0], u_t=zero)
+    enumsol.write_frd(problem, rest, tmp_path / "rest.frd")
+    lines = (tmp_path / "rest.frd").read_text().splitlines()
+    points = columns(tmp_path / "rest.frd", "    2C")
+    first = next(k for k, line in enumerate(lines) if line.startswith("    3C")) + 2
+    cell = [
+        np.array(points[int(node)])
+        for line in lines[first : first + 3]
+        if line[:3] == " -2"
+        for node in line.split()[1:]
+    ]
+    corners = len(set("".join(between.split())))
+    for place, (one, other) in zip(cell[corners:], between.split(), strict=False):
+        np.testing.assert_allclose(place, 0.5 * (cell[int(one)] + cell[int(other)]), atol=1e-6)
