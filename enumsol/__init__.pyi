@@ -57,6 +57,7 @@ from .errors import (
     TooLargeError as TooLargeError,
 )
 from .fem.deck_scenes import DeckModel as DeckModel, read_deck as read_deck
+from .fem.deck_starts import write_start as write_start
 from .fixed_points import (
     FixedPoint as FixedPoint,
     TrescaSolution as TrescaSolution,

@@ -6,6 +6,7 @@ TOML files and calls of `mesh_problem` share one builder. The steps become the l
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Collection
 from dataclasses import dataclass, field
 from functools import cached_property
@@ -176,6 +177,11 @@ class DeckModel:
     def step_count(self) -> int:
         """Number of its steps."""
         return len(self.deck.analysis.steps)
+
+    @property
+    def times(self) -> list[float]:
+        """The times at which its steps end, counted from the beginning of the first."""
+        return [*itertools.accumulate(step.period for step in self.deck.analysis.steps)]
 
     @cached_property
     def mesh(self) -> PartedMesh:

@@ -130,6 +130,11 @@ class Scene:
         parts = self.contacts.parts
         return of_rows(F, name, parts, finite_number), of_rows(slope, f"{name}_slope", parts, finite_number, other)
 
+    @cached_property
+    def tangents(self) -> tuple[Floats, ...]:
+        """One or two tangents of the contact nodes, each (p, d)."""
+        return _axes(self.contacts.rows, self.options.axis, self.dimension)
+
     @property
     def gaps_of_groups(self) -> list[tuple[Group, Floats]]:
         """The groups of contact nodes, each with the gaps of its own."""
@@ -210,7 +215,6 @@ class Scene:
             for own, other in ((self.forces, self.joints.forces), (self.slope, self.joints.slope))
         )
         named = self.joints.references.named
-        axes = _axes(nodes, self.options.axis, self.dimension)
         problem = problem_of(
             Body(
                 sp.csc_array(elastic + resized(self.springs, count)),
@@ -221,7 +225,7 @@ class Scene:
                 named=named,
             ),
             nodes,
-            axes,
+            self.tangents,
             modes=None if modes is None else np.pad(modes, ((0, count - len(modes)), (0, 0))),
             mass=None if mass is None else resized(mass, count),
             mesh=lambda motion, moved: BodyMesh(mesh.points, mesh.cells, motion, moved, surface, **self._kept()),
