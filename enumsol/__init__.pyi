@@ -57,7 +57,6 @@ from .errors import (
     TooLargeError as TooLargeError,
 )
 from .fem.deck_scenes import DeckModel as DeckModel, read_deck as read_deck
-from .fem.deck_starts import write_start as write_start
 from .fixed_points import (
     FixedPoint as FixedPoint,
     TrescaSolution as TrescaSolution,
@@ -68,6 +67,7 @@ from .fixed_points import (
 )
 from .io import read_problem as read_problem, write_problem as write_problem
 from .io.calculix import read_results as read_results, write_frd as write_frd
+from .io.deck_starts import write_start as write_start
 from .io.vtu import write_vtu as write_vtu
 from .loading.growing import HistoryProgress as HistoryProgress, histories as histories
 from .loading.history import History as History

@@ -183,7 +183,7 @@ def _write_states(problem: AnyProblem, found: RootSet, path: str, option: str) -
 
 
 def _write_starts(name: str, found: RootSet, path: str) -> None:
-    from enumsol.fem.deck_starts import write_start  # numpy: not for --help
+    from enumsol.io.deck_starts import write_start  # numpy: not for --help
 
     model = deck_named(name)
     place = Path(path)

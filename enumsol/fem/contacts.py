@@ -157,7 +157,7 @@ class Contacts:
     groups: list[Group]
 
     def without(self, nodes: Integers) -> Contacts:
-        """The same without some nodes, whose areas go to the others of their group.
+        """Contacts without some nodes, whose areas go to the others of their group.
 
         Raises
         ------

@@ -132,7 +132,7 @@ class Scene:
 
     @cached_property
     def tangents(self) -> tuple[Floats, ...]:
-        """One or two tangents of the contact nodes, each (p, d)."""
+        """Tangents of the contact nodes, one in 2D and two in 3D, each (p, d)."""
         return _axes(self.contacts.rows, self.options.axis, self.dimension)
 
     @property

@@ -8,8 +8,9 @@ slips that its stiffness of sticking allows. An equilibrium that runs away can b
 
 from __future__ import annotations
 
+import itertools
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 import scipy.sparse as sp
@@ -27,8 +28,8 @@ if TYPE_CHECKING:
     from enumsol.decks.states import DeckState
     from enumsol.fem.deck_scenes import DeckModel
     from enumsol.fem.scenes import Scene
-    from enumsol.roots.root import Root
-    from enumsol.support.array_types import Floats
+    from enumsol.io.vtu import SolvedState
+    from enumsol.support.array_types import Floats, Mask
 
 #: Tangents that move less of the free components of a node are held by supports, and coefficients that are rounding.
 _NONE = 1e-9
@@ -38,7 +39,7 @@ _TERMS = 4
 _SLICE = 1.0 / 180.0
 
 
-def write_start(model: DeckModel, root: Root, file: str | os.PathLike[str], *, step: int | None = None) -> None:
+def write_start(model: DeckModel, root: SolvedState, file: str | os.PathLike[str], *, step: int | None = None) -> None:
     """Write a deck that leads CalculiX to an equilibrium of a step, and lets it go there.
 
     Its first step ends in the equilibrium, held by its slips, and its second one, at time 2, where the body goes when
@@ -47,8 +48,8 @@ def write_start(model: DeckModel, root: Root, file: str | os.PathLike[str], *, s
     Parameters
     ----------
     model : DeckModel
-    root : Root
-        Of the problem of this step.
+    root : Root or other state
+        A solution of the problem of this step, with u (n,) and lambda_t (p,), in 3D (p, 2).
     file : str or path-like
         Written anew; in the folder of the deck if that includes files.
     step : int or None
@@ -69,18 +70,18 @@ def write_start(model: DeckModel, root: Root, file: str | os.PathLike[str], *, s
     """
     place = file_path(file, "file", "a deck")
     scene, deck = model.scene(step), model.deck
-    if root.problem.p != len(scene.contacts.gaps) or root.problem.mesh is None:
+    problem = scene.problem()
+    if np.shape(root.u) != (problem.n,) or problem.mesh is None:
         raise InvalidArgumentError("root is of another problem; expected one of the step of the deck")
     state = states_of(deck)[(step or 1) - 1]
-    free = _Slips(deck, scene, root)
-    slips, forces = free.values, free.forces
-    lines = [*_before_steps(deck, place, step or 1), "*NODE", *(f"{node}, 0., 0., 0." for node in free.nodes)]
-    lines += free.equations
-    held = [f"{node}, 1, 1, {_number(value)}" for node, value in zip(free.nodes, slips, strict=True)]
-    pushed = [f"{node}, 1, {_number(value)}" for node, value in zip(free.nodes, forces, strict=True)]
+    moves = problem.mesh.displacements(np.asarray(root.u))
+    nodes, equations, slips, forces = _slips(deck, scene, moves, np.asarray(root.lambda_t))
+    lines = [*_before_steps(deck, place, step or 1), "*NODE", *(f"{node}, 0., 0., 0." for node in nodes), *equations]
+    held = [f"{node}, 1, 1, {_number(value)}" for node, value in zip(nodes, slips, strict=True)]
+    pushed = [f"{node}, 1, {_number(value)}" for node, value in zip(nodes, forces, strict=True)]
     supports, loads = _supports(deck, state), _loads(deck, state)
     lines += _step(["*BOUNDARY, OP=NEW", *supports, *held, *loads, *(["*CLOAD", *pushed] if pushed else [])])
-    gone = [f"{node}, 1, 0." for node in free.nodes]
+    gone = [f"{node}, 1, 0." for node in nodes]
     lines += _step(["*BOUNDARY, OP=NEW", *supports, *(["*CLOAD", *gone] if gone else [])])
     write_file(place, "\n".join([*lines, ""]), "file")
 
@@ -94,45 +95,44 @@ def _step(acts: list[str]) -> list[str]:
     return ["*STEP, INC=1000", "*STATIC", "0.1, 1.", *acts, "*NODE FILE", "U", "*END STEP"]
 
 
-class _Slips:
-    """Slips of contact nodes as displacements of nodes of their own, with the forces that act on them."""
+def _slips(
+    deck: Deck, scene: Scene, moves: Floats, friction: Floats
+) -> tuple[list[int], list[str], list[float], list[float]]:
+    """Nodes whose displacements are slips of contact nodes, their equations, the slips, and forces on them."""
+    nodes: list[int] = []
+    equations: list[str] = []
+    values: list[float] = []
+    mesh, rows, d = scene.mesh, scene.contacts.rows, scene.dimension
+    labels = [label if isinstance(label, int) else -1 for label in mesh.node_labels or ()]
+    own, moved = _without_completing(scene), np.asarray(rows.means @ moves)
+    frames = np.stack(scene.tangents, axis=1)
+    along = (-_SLICE if scene.body.axisymmetric else -1.0) * friction.reshape(len(frames), -1)
+    forces: list[float] = []
+    first = 1 + int(max(deck.node_labels))
+    for k, node in enumerate(rows.nodes):
+        free = ~scene.held.fixed[node]
+        kept = [j for j in range(d - 1) if np.max(np.abs(frames[k, j][free]), initial=0) > _NONE]
+        if not kept or labels[node] < 0:
+            continue
+        axes, others = frames[k, kept], sp.coo_array(rows.means[[k]] @ own)
+        pivots = _pivots(axes, free)
+        solved = np.linalg.inv(axes[:, pivots])
+        new = [first + len(nodes) + j for j in range(len(kept))]
+        for j, pivot in enumerate(pivots):
+            terms = {(labels[node], pivot): 1.0}
+            for (other, weight), c in itertools.product(zip(others.coords[1], others.data, strict=True), range(d)):
+                value = float(solved[j] @ axes[:, c]) * weight
+                if abs(value) > _NONE and not (other == node and c in pivots):
+                    terms[labels[other], c] = value
+            terms |= {(new[i], 0): -float(solved[j, i]) for i in range(len(kept)) if abs(solved[j, i]) > _NONE}
+            equations += _equation(terms)
+        nodes += new
+        values += (axes @ moved[k]).tolist()
+        forces += along[k, kept].tolist()
+    return nodes, equations, values, forces
 
-    def __init__(self, deck: Deck, scene: Scene, root: Root) -> None:
-        self.nodes: list[int] = []
-        self.equations: list[str] = []
-        self.values: list[float] = []
-        self.forces: list[float] = []
-        mesh, rows, d = scene.mesh, scene.contacts.rows, scene.dimension
-        labels = [label if isinstance(label, int) else -1 for label in mesh.node_labels or ()]
-        own, means = _without_completing(scene), rows.means
-        moved = np.asarray(means @ root.problem.mesh.displacements(root.u))
-        frames = np.stack(scene.tangents, axis=1)
-        along = np.asarray(root.lambda_t).reshape(len(frames), -1)
-        share = _SLICE if scene.body.axisymmetric else 1.0
-        first = 1 + int(max(deck.node_labels))
-        for k, node in enumerate(rows.nodes):
-            kept = [j for j in range(d - 1) if np.max(np.abs(frames[k, j][~scene.held.fixed[node]]), initial=0) > _NONE]
-            if not kept or labels[node] < 0:
-                continue
-            axes, others = frames[k, kept], sp.coo_array(means[[k]] @ own)
-            pivots = _pivots(axes, ~scene.held.fixed[node])
-            solved = np.linalg.inv(axes[:, pivots])
-            new = [first + len(self.nodes) + j for j in range(len(kept))]
-            for j, pivot in enumerate(pivots):
-                terms = {(labels[node], pivot): 1.0}
-                for other, weight in zip(others.coords[1], others.data, strict=True):
-                    for c in range(d):
-                        value = float(solved[j] @ axes[:, c]) * weight
-                        if abs(value) > _NONE and not (other == node and c in pivots):
-                            terms[labels[other], c] = value
-                terms |= {(new[i], 0): -float(solved[j, i]) for i in range(len(kept)) if abs(solved[j, i]) > _NONE}
-                self.equations += _equation(terms)
-            self.nodes += new
-            self.values += (axes @ moved[k]).tolist()
-            self.forces += (-share * along[k, kept]).tolist()
 
-
-def _pivots(axes: Floats, free: Any) -> list[int]:
+def _pivots(axes: Floats, free: Mask) -> list[int]:
     """Components in which a node that is not held there can follow along axes."""
     found: list[int] = []
     left = np.where(free, axes, 0.0)
