@@ -12,17 +12,20 @@ import numpy as np
 
 from enumsol.arithmetic.balls import SAFE, TINY, UNIT, Ball
 from enumsol.condensation.space_condensed import PieceSpace
-from enumsol.trusted.space.leaf_conditions import by_parameter, chosen_parameter, condition_rates, slacks
+from enumsol.trusted.space.force_bound import is_unbalanced_in_space
 from enumsol.trusted.space.leaf_equations import (
     ROUNDED_ANGLE,
     Leaf,
     around_middle,
+    by_parameter,
+    chosen_parameter,
+    condition_rates,
     patterns,
+    slacks,
     turned,
     with_free_bounds,
 )
 from enumsol.trusted.space.leaves import Open, SpaceRoot, settle
-from enumsol.trusted.space.resultants import is_unbalanced_in_space
 from enumsol.trusted.space.sector_margins import swept_margin
 from enumsol.trusted.space.space_uniqueness import is_complete, only_on_curve
 
