@@ -271,7 +271,7 @@ def _same(one: CurveBox, other: CurveBox) -> bool:
 _PARTS, _OF_LINK, _CUT, _CUTS = 64, 4, 64, 24
 
 
-class Run(NamedTuple):
+class LinkRange(NamedTuple):
     """Links of a curve, one after the other, by the numbers of the first and the last one.
 
     Along a closed curve the last one may come first: the links between go through the curve's first point.
@@ -413,14 +413,14 @@ class KnownCurve:
     problem: AlphaProblem
     chain: CurveChain
 
-    def places(self, run: Run) -> NDArray[np.intp] | None:
+    def places(self, run: LinkRange) -> NDArray[np.intp] | None:
         """The links of a run; None where there are no such links."""
         count, (first, last) = len(self.chain.links), run
         if not (0 <= first < count and 0 <= last < count) or (last < first and not self.chain.closed):
             return None
         return np.arange(first, last + 1 + (count if last < first else 0)) % count
 
-    def passes(self, run: Run, low: Fraction, high: Fraction) -> bool:
+    def passes(self, run: LinkRange, low: Fraction, high: Fraction) -> bool:
         """True if a run passes every alpha of a piece: its ends lie on either side of it, or at its ends."""
         if self.places(run) is None:
             return False
@@ -450,7 +450,7 @@ class KnownCurve:
         low, high = (np.array([float(pair[k]) for pair in bounds]) for k in (0, 1))
         return np.nextafter(low, -np.inf), np.nextafter(high, np.inf)
 
-    def over(self, run: Run, low: Fraction, high: Fraction) -> CurveParts:
+    def over(self, run: LinkRange, low: Fraction, high: Fraction) -> CurveParts:
         """The part of a run with alphas in a piece, in parts in its order; none where it does not come there."""
         links, places = self._links, self.places(run)
         assert places is not None
