@@ -103,11 +103,9 @@ class Checker(TreeChecker[EnclosedSystem, "VerifiedSelection | ClosedSolution | 
     def rational(self) -> RationalSystem:
         """The condensed problem in rationals; computed only if a leaf needs it."""
         self._allow_rationals()
-        from enumsol.checker.rational import FloatingRationalSystem, RationalSystem  # python-flint, not always needed
+        from enumsol.checker.rational import RationalSystem  # python-flint, not always needed
 
-        if not self.problem.held:
-            return FloatingRationalSystem(self.problem, self.alpha)
-        return RationalSystem(self.problem, self.alpha, definite=self._definite)
+        return RationalSystem(self.problem, self.alpha, definite=self.problem.held and self._definite)
 
     @cached_property
     def _body(self) -> RationalBody:
@@ -307,7 +305,7 @@ class Checker(TreeChecker[EnclosedSystem, "VerifiedSelection | ClosedSolution | 
 
     def _rests_on_reach(self, codes: Codes, points: Sequence[Sequence[Fraction]]) -> bool:
         """True if a selection may hold more without the bounds of the rigid displacement."""
-        return not self.problem.held and self.rational.rests_on_reach(codes, points)  # type: ignore[attr-defined]
+        return not self.problem.held and self.rational.rests_on_reach(codes, points)
 
     def _excluded_in_rationals(self, codes: Codes, said: kinds.Excluded) -> str | None:
         p = self.problem.p
