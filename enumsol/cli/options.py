@@ -51,7 +51,7 @@ _NO_TEXTS = {
     **dict.fromkeys(("--proof", "--save", "--graphml", "--report", "report --output"), ""),
     **dict.fromkeys(("roots --proof", "solve --proof"), ", but a proof is a binary file"),
     **dict.fromkeys(("--npz", "--vtu"), ", but it is a binary file"),
-    "--frd": "",
+    **dict.fromkeys(("--frd", "--start"), ""),
     "--plot": ", but a figure is a binary file",
 }
 #: Patterns by which meshes name files that belong to them: heavy data of XDMF, included files of Abaqus.
@@ -289,7 +289,7 @@ Problem = Annotated[str, typer.Argument(autocompletion=problem_names, show_defau
 Number = Annotated[str, typer.Option(metavar="NUMBER", show_default=False)]
 Count = Annotated[int, typer.Option(min=1, metavar="N", rich_help_panel=LIMITS)]
 Seconds = Annotated[float, typer.Option(metavar="SECONDS", rich_help_panel=LIMITS)]
-#: Files to write; those that are read have other metavariables (cli.files).
+#: Files to write; those that are read have other metavariables.
 OutputFile = Annotated[str, typer.Option(metavar="FILE", rich_help_panel=OUTPUT)]
 PlotFile = Annotated[str, typer.Option(metavar="FILE", rich_help_panel=PLOT)]
 Units = Annotated[str, typer.Option(metavar="FORCE,LENGTH", rich_help_panel=OUTPUT)]
