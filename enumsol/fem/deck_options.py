@@ -30,14 +30,15 @@ _PLANES = {"plane strain": "strain", "plane stress": "stress", "axisymmetric": "
 
 
 def shared(deck: Deck, parts: DeckParts) -> dict[str, Any]:
-    """Options that are the same in all steps: materials, contacts.
+    """Options that are the same in all steps: materials; contacts are looked at.
 
     Raises
     ------
     InvalidArgumentError
         A material or a contact is not what is known here.
     """
-    return {**_materials(deck, parts), **_contacts(deck)}
+    _check_contacts(deck, parts)
+    return _materials(deck, parts)
 
 
 def _materials(deck: Deck, parts: DeckParts) -> dict[str, Any]:
@@ -173,50 +174,54 @@ def _planes(deck: Deck, parts: DeckParts) -> Any:
     return {parts.elements(np.concatenate(own), f"plane {name}"): name for name, own in rows.items()}
 
 
-def _contacts(deck: Deck) -> dict[str, Any]:
-    """Pairs of surfaces that may touch."""
+def _check_contacts(deck: Deck, parts: DeckParts) -> None:
+    """Refuse contacts between what there is not."""
     said = deck.analysis
     if not said.pairs:
         raise InvalidArgumentError(f"{deck.path} has no *CONTACT PAIR; expected contact")
     for pair in said.pairs:
         for name in (pair.slave, pair.master):
-            if name not in deck.surfaces:
-                raise InvalidArgumentError(
-                    f"{pair.place}: *CONTACT PAIR names {name}; expected a surface, one of "
-                    f"{', '.join(deck.surfaces) or 'none'}"
-                )
+            parts.check_surface(name, pair.place, "CONTACT PAIR")
         if pair.interaction not in said.interactions:
             raise InvalidArgumentError(
                 f"{pair.place}: *CONTACT PAIR names the interaction {pair.interaction or 'nothing'}; expected one of "
                 f"{', '.join(said.interactions) or 'none'}"
             )
-    pairs = [(pair.slave, pair.master, *_gap(pair)) for pair in touching(deck)]
-    if not pairs:
+        if isinstance(pair.adjust, str):
+            deck.nodes_of(pair.adjust, pair.place)
+    if not _touching(deck, 0):
         raise InvalidArgumentError(f"{said.pairs[0].place}: all surfaces of *CONTACT PAIR are tied; expected contact")
-    return {"pairs": pairs}
 
 
-def touching(deck: Deck) -> list[ContactPair]:
-    """Pairs of surfaces that are not tied."""
-    said = deck.analysis
-    return [pair for pair in said.pairs if not (pair.tied or said.interactions[pair.interaction].tied)]
+def _touching(deck: Deck, step: int) -> list[ContactPair]:
+    """Pairs of surfaces that may touch in a step: not tied, and not taken out of contact by then."""
+    said, removed = deck.analysis, dict[tuple[str, str], bool]()
+    for own in said.steps[:step]:
+        removed |= {pair: not there for pair, there in own.contacts.items()}
+    apart = [pair for pair in said.pairs if not (pair.tied or said.interactions[pair.interaction].tied)]
+    return [pair for pair in apart if not removed.get((pair.slave, pair.master), False)]
 
 
-def _gap(pair: ContactPair) -> list[Any]:
-    """The gap of a pair, where it is not that of the geometry."""
-    return [] if pair.clearance is None else [pair.clearance]
-
-
-def friction(deck: Deck, step: int) -> dict[str, float]:
-    """Coefficients of friction in a step, by surfaces.
+def contacts(deck: Deck, step: int) -> dict[str, Any]:
+    """Options for the pairs that may touch in a step (0: before the first), and their coefficients of friction.
 
     Raises
     ------
     InvalidArgumentError
-        A surface has two.
+        There are none, or a surface has two coefficients.
     """
+    touching = _touching(deck, step)
+    if not touching:
+        place = deck.analysis.steps[step - 1].place
+        raise InvalidArgumentError(f"{place}: no pair is in contact in step {step}; expected one, or --step")
+    pairs = [(pair.slave, pair.master, *([] if pair.clearance is None else [pair.clearance])) for pair in touching]
+    return {"pairs": pairs, "friction": _friction(deck, touching, step)}
+
+
+def _friction(deck: Deck, touching: list[ContactPair], step: int) -> dict[str, float]:
+    """Coefficients of friction in a step, by surfaces."""
     said, found = deck.analysis, dict[str, float]()
-    for pair in touching(deck):
+    for pair in touching:
         value = said.interactions[pair.interaction].friction
         for own in said.steps[:step]:
             value = own.friction.get(pair.interaction, value)
