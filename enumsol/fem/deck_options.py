@@ -309,26 +309,28 @@ def _on_nodes(
         else:
             of_lines.setdefault(place, {}).setdefault(row, {})[entry] = value
     found: dict[str, list[Any]] = {}
-    for place, nodes in of_lines.items():
-        parts.told_of_loose(np.array(list(nodes)), kind, place)
-        groups: dict[Any, list[int]] = {}
-        for row, own in nodes.items():
-            groups.setdefault(tuple(sorted(own.items())), []).append(row)
-        for given, rows in groups.items():
-            inside = parts.in_bodies(np.array(rows))
-            if len(inside):
-                wanted = _wanted(deck, inside, f"{kind.lower()} of line {place.line}")
-                name = parts.nodes(inside, wanted) if kind == "BOUNDARY" else parts.exactly(inside, wanted)
-                for k, value in given:
-                    found.setdefault(name, [free] * dimension)[k] = value
+    names = {rows.tobytes(): name for name, rows in reversed(deck.node_sets.items())}
+    for place, given, rows in _groups(of_lines):
+        parts.told_of_loose(rows, kind, place)
+        inside = parts.in_bodies(rows)
+        if len(inside):
+            wanted = names.get(inside.tobytes(), f"{kind.lower()} of line {place.line}")
+            name = parts.nodes(inside, wanted) if kind == "BOUNDARY" else parts.exactly(inside, wanted)
+            for k, value in given:
+                found.setdefault(name, [free] * dimension)[k] = value
     return found, points
 
 
-def _wanted(deck: Deck, rows: Integers, otherwise: str) -> str:
-    """Name of a set of nodes that has just these, or another one."""
-    ordered = np.sort(rows)
-    same = (name for name, own in deck.node_sets.items() if np.array_equal(np.sort(own), ordered))
-    return next(same, otherwise)
+def _groups(
+    of_lines: dict[DeckPlace, dict[int, dict[int, float]]],
+) -> list[tuple[DeckPlace, tuple[tuple[int, float], ...], Integers]]:
+    """Nodes to which a line gives the same, with what it gives them; lines of single nodes together."""
+    groups: dict[Any, tuple[DeckPlace, list[int]]] = {}
+    for place, nodes in of_lines.items():
+        for row, own in nodes.items():
+            given = tuple(sorted(own.items()))
+            groups.setdefault((given, place if len(nodes) > 1 else None), (place, []))[1].append(row)
+    return [(place, given, np.unique(rows)) for (given, _), (place, rows) in groups.items()]
 
 
 def _pressures(deck: Deck, parts: DeckParts, state: DeckState) -> dict[str, float]:

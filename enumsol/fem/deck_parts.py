@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from enumsol.decks.model import Deck
     from enumsol.fem.meshes import PartedMesh
     from enumsol.fem.scenes import Scene
-    from enumsol.support.array_types import Floats, Integers
+    from enumsol.support.array_types import Floats, Integers, Mask
 
 
 class DeckParts:
@@ -96,7 +96,7 @@ class DeckParts:
 
     def in_bodies(self, rows: Integers) -> Integers:
         """Nodes among these that belong to bodies."""
-        return rows[np.isin(rows, self.used)]
+        return rows[self._is_used[rows]]
 
     def exactly(self, rows: Integers, wanted: str) -> str:
         """Name of a set of these nodes alone, without nodes that elements of 20 nodes get in the middle of facets."""
@@ -153,6 +153,12 @@ class DeckParts:
         own = [block.nodes.ravel() for block in self._deck.blocks if self._deck.is_body(block)]
         return np.unique(np.concatenate([np.zeros(0, dtype=np.int64), *own]))
 
+    @cached_property
+    def _is_used(self) -> Mask:
+        found = np.zeros(len(self._deck.points), dtype=bool)
+        found[self.used] = True
+        return found
+
     def adjusted(self, scene: Scene) -> PartedMesh:
         """Mesh whose contact nodes are moved onto what they face where the deck says so."""
         points, first = scene.mesh.points.copy(), 0
@@ -162,7 +168,7 @@ class DeckParts:
             adjust = None if group.pair is None else adjusts.get((group.pair.slave, group.pair.master))
             rows = scene.contacts.rows
             if isinstance(adjust, str):
-                chosen = np.searchsorted(self._used, self.in_bodies(self._deck.node_sets[adjust]))
+                chosen = np.searchsorted(self.used, self.in_bodies(self._deck.node_sets[adjust]))
                 near = np.isin(rows.nodes[own], chosen) & (gaps != 0)
             elif adjust is not None:
                 near = (gaps <= adjust) & (gaps != 0)

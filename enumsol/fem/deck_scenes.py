@@ -294,9 +294,9 @@ def _lines(lines: list[int]) -> str:
 
 def _differs(first: AnyProblem, other: AnyProblem) -> str | None:
     """Data that two problems do not share but for load and friction, in words."""
-    if first.n != other.n or first.p != other.p:
-        return "what is held"
-    if (first.A != other.A).nnz:
+    if first.p != other.p or (first.n == other.n and (first.Bn != other.Bn).nnz):
+        return "which pairs are in contact, or what is held"
+    if first.n != other.n or (first.A != other.A).nnz:
         return "what is held"
     if np.any(first.gap != other.gap) or np.any(first.slip_offset != other.slip_offset):
         return "the displacement of nodes that are in contact or faced by such"

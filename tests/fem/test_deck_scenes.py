@@ -286,6 +286,10 @@ def test_a_motion_of_nodes_without_contact_and_friction_are_steps_of_a_history(r
     ("cards", "what"),
     [
         ("*BOUNDARY, OP=NEW\nBOTTOM, 1, 2\nSIDE, 1\n", "what is held"),
+        (
+            "*MODEL CHANGE, TYPE=CONTACT PAIR, REMOVE\nABOVE, ON\n*MODEL CHANGE, TYPE=CONTACT PAIR, ADD\nUNDER, ON\n",
+            "which pairs are in contact",
+        ),
         ("*BOUNDARY\nBOTTOM, 2, 2, 0.01\n", "the displacement of nodes that are in contact or faced by such"),
     ],
 )
