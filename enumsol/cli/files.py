@@ -41,7 +41,7 @@ _NO_TEXTS = {
     **dict.fromkeys(("--proof", "--save", "--graphml", "--report", "report --output"), ""),
     **dict.fromkeys(("roots --proof", "solve --proof"), ", but a proof is a binary file"),
     **dict.fromkeys(("--npz", "--vtu"), ", but it is a binary file"),
-    "--frd": "",
+    **dict.fromkeys(("--frd", "--start"), ""),
     "--plot": ", but a figure is a binary file",
 }
 #: Patterns by which meshes name files that belong to them: heavy data of XDMF, included files of Abaqus.

@@ -43,7 +43,7 @@ def shared(deck: Deck, parts: DeckParts) -> dict[str, Any]:
 def _materials(deck: Deck, parts: DeckParts) -> dict[str, Any]:
     """Elastic constants and their axes, density and thickness by sets of elements, and the plane."""
     found: dict[str, dict[str, Any]] = {name: {} for name in _BY_MATERIAL}
-    for section, rows in _sections(deck):
+    for section, rows in elastic_sections(deck):
         name = parts.elements(rows, section.elements)
         material = deck.materials[section.material]
         if not material.elastic:
@@ -55,7 +55,7 @@ def _materials(deck: Deck, parts: DeckParts) -> dict[str, Any]:
         else:
             found["orthotropic"][name] = _engineering_constants(material)
             if section.orientation:
-                found["orientation"][name] = _axes(deck, section)
+                found["orientation"][name] = axes_of_section(deck, section)
         expansion = () if material.expansion is None else material.expansion.tolist()
         if len(expansion) > 1:
             raise InvalidArgumentError(
@@ -96,8 +96,14 @@ def _engineering_constants(material: Material) -> list[float]:
     return [*map(float, young), *map(float, poisson), *shear]
 
 
-def _axes(deck: Deck, section: Section) -> list[float]:
-    """Directions of the first two axes of the material of a section."""
+def axes_of_section(deck: Deck, section: Section) -> list[float]:
+    """Directions of the first two axes of the material of a section.
+
+    Raises
+    ------
+    InvalidArgumentError
+        It names no orientation, or one whose axes turn within an element.
+    """
     if section.orientation not in deck.orientations:
         known = ", ".join(deck.orientations) or "none"
         raise InvalidArgumentError(
@@ -120,8 +126,14 @@ def _axes(deck: Deck, section: Section) -> list[float]:
     return [*map(float, axes[0]), *map(float, axes[1])]
 
 
-def _sections(deck: Deck) -> list[tuple[Section, Integers]]:
-    """Sections of bodies with the rows of their elements."""
+def elastic_sections(deck: Deck) -> list[tuple[Section, Integers]]:
+    """Sections of bodies with the rows of their elements.
+
+    Raises
+    ------
+    InvalidArgumentError
+        An element has none or two of them, or one of another kind or without a material.
+    """
     bodies = np.concatenate([np.full(len(block.labels), deck.is_body(block)) for block in deck.blocks])
     found, without = [], bodies.copy()
     for section in deck.sections:
@@ -353,7 +365,7 @@ def _volume_forces(deck: Deck, parts: DeckParts, state: DeckState) -> dict[str, 
         place = state.places["GRAV", target, direction]
         wanted = deck.elements_of(str(target), place)
         axis = np.array([float(part) for part in str(direction).split()])
-        for section, rows in _sections(deck):
+        for section, rows in elastic_sections(deck):
             density = deck.materials[section.material].density
             own = np.intersect1d(rows, wanted)
             if len(own) and density is None:

@@ -11,8 +11,8 @@ import numpy as np
 
 from enumsol.decks.model import Account, Surface
 from enumsol.errors import InvalidArgumentError
+from enumsol.fem.cell_blocks import completing
 from enumsol.fem.mesh_files import mesh_of_deck
-from enumsol.model.cells import KINDS, by_kind
 from enumsol.support.messages import counted
 
 if TYPE_CHECKING:
@@ -68,7 +68,7 @@ class DeckParts:
 
     def in_bodies(self, rows: Integers) -> Integers:
         """Nodes among these that belong to bodies."""
-        return rows[np.isin(rows, self._used)]
+        return rows[np.isin(rows, self.used)]
 
     def exactly(self, rows: Integers, wanted: str) -> str:
         """Name of a set of these nodes alone, without nodes that elements of 20 nodes get in the middle of facets."""
@@ -105,26 +105,22 @@ class DeckParts:
     def at_nodes(self, mesh: PartedMesh, values: Floats) -> Floats:
         """Values at all nodes of the mesh, of those at the nodes of the deck.
 
-        Nodes in the middle of facets and of elements of 20 nodes have what the shape functions of these give.
+        Nodes that complete elements have what the shape functions of these give.
         """
         found = np.zeros(len(mesh.points))
-        found[: len(self._used)] = values[self._used]
-        for _, cells in by_kind(mesh.points.shape[1], mesh.cells) if len(found) > len(self._used) else ():
-            if cells.shape[1] == 27:
-                sides = cells[:, KINDS[3, 27].facets]
-                corners, between = found[sides[..., :4]].sum(axis=2), found[sides[..., 4:8]].sum(axis=2)
-                found[sides[..., 8]] = 0.5 * between - 0.25 * corners
-                found[cells[:, 26]] = 0.25 * (found[cells[:, 8:20]].sum(axis=1) - found[cells[:, :8]].sum(axis=1))
+        found[: len(self.used)] = values[self.used]
+        for nodes, shares in completing(mesh.points.shape[1], mesh.cells, len(self.used)):
+            found[nodes[:, 0]] = found[nodes[:, 1:]] @ shares
         return found
 
     def mesh(self) -> PartedMesh:
         """Mesh of the deck with all of these."""
         mesh = mesh_of_deck(self._deck)
-        exact = {name: np.searchsorted(self._used, rows) for name, rows in self._exact.items()}
+        exact = {name: np.searchsorted(self.used, rows) for name, rows in self._exact.items()}
         return replace(mesh, node_sets=MappingProxyType({**mesh.node_sets, **exact})) if exact else mesh
 
     @cached_property
-    def _used(self) -> Integers:
+    def used(self) -> Integers:
         """Rows of the nodes of bodies, in the order in which its mesh has them."""
         own = [block.nodes.ravel() for block in self._deck.blocks if self._deck.is_body(block)]
         return np.unique(np.concatenate([np.zeros(0, dtype=np.int64), *own]))

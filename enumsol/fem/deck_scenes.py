@@ -6,6 +6,7 @@ TOML files and calls of `mesh_problem` share one builder. The steps become the l
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Collection
 from dataclasses import dataclass, field
 from functools import cached_property
@@ -19,9 +20,10 @@ from enumsol.errors import InvalidArgumentError, InvalidProblemError
 from enumsol.fem.deck_joints import DeckJoints
 from enumsol.fem.deck_options import acting, friction, is_plane, shared
 from enumsol.fem.deck_parts import DeckParts
+from enumsol.fem.deck_stiffness import CODES, with_calculix
 from enumsol.fem.mesh_problems import mesh_scene
 from enumsol.loading.steps import LoadStep
-from enumsol.support.arguments import file_path, positive_integer
+from enumsol.support.arguments import file_path, one_of, positive_integer
 from enumsol.support.messages import counted
 
 if TYPE_CHECKING:
@@ -34,7 +36,7 @@ if TYPE_CHECKING:
     from enumsol.model.problem3d import AnyProblem
 
 
-def read_deck(path: str | os.PathLike[str], *, ignore: Collection[str] = ()) -> DeckModel:
+def read_deck(path: str | os.PathLike[str], *, ignore: Collection[str] = (), assemble: str | None = None) -> DeckModel:
     """Model that a deck of CalculiX or Abaqus describes: a contact problem for every step, and a history of them.
 
     ``print(read_deck("model.inp"))`` says what became of every card. Nothing of a deck is dropped without a word: a
@@ -48,6 +50,9 @@ def read_deck(path: str | os.PathLike[str], *, ignore: Collection[str] = ()) -> 
     ignore : collection of str
         Cards, and types of elements, that are left out though they may change the answer, such as ``["PLASTIC"]``;
         "NLGEOM" takes the displacements of all steps to be small.
+    assemble : "ccx" or None
+        Take the stiffness of the elements from an installed CalculiX, which knows types that are otherwise taken as
+        others (C3D8R, C3D20R): it assembles the elements alone, without contact, supports, joints and loads.
 
     Returns
     -------
@@ -69,8 +74,10 @@ def read_deck(path: str | os.PathLike[str], *, ignore: Collection[str] = ()) -> 
     A deck that is read is shown with `DeckModel`.
     """
     place = file_path(path, "path")
+    if assemble is not None:
+        one_of(assemble, "assemble", CODES)
     try:
-        return DeckModel(described(place, ignore=ignore), tuple(ignore))
+        return DeckModel(described(place, ignore=ignore), tuple(ignore), assemble)
     except InvalidArgumentError as error:
         raise InvalidProblemError(str(error)) from error
 
@@ -85,6 +92,8 @@ class DeckModel:
         The plain description.
     ignored : tuple of str
         What was left out though it may change the answer.
+    assemble : str or None
+        The code that assembles the stiffness.
 
     Examples
     --------
@@ -137,6 +146,7 @@ class DeckModel:
 
     deck: Deck
     ignored: tuple[str, ...] = ()
+    assemble: str | None = None
     _parts: DeckParts = field(init=False, repr=False)
     _options: list[dict[str, Any]] = field(init=False, repr=False)
     _scenes: dict[int, Scene] = field(init=False, repr=False, default_factory=dict)
@@ -167,6 +177,11 @@ class DeckModel:
     def step_count(self) -> int:
         """Number of its steps."""
         return len(self.deck.analysis.steps)
+
+    @property
+    def times(self) -> list[float]:
+        """The times at which its steps end, counted from the beginning of the first."""
+        return [*itertools.accumulate(step.period for step in self.deck.analysis.steps)]
 
     @cached_property
     def mesh(self) -> PartedMesh:
@@ -201,7 +216,7 @@ class DeckModel:
             scene = mesh_scene(moved, **options)
         if any(piece.free_motions(scene.mesh.points, scene.hold) for piece in scene.moving):
             scene = mesh_scene(self.mesh, **options, max_rigid_displacement="auto")
-        return scene
+        return scene if self.assemble is None else with_calculix(scene, self.deck, self._parts.used)
 
     def problem(self, step: int | None = None) -> AnyProblem:
         """Contact problem at the end of a step (from 1), reached from no load at once.
