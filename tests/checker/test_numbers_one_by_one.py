@@ -51,7 +51,7 @@ PROOFS = {
     **{f"arcs, {name}": lambda name=name: original(name)[:2] for name in ("fold", "held by contact")},
 }
 HISTORIES = {
-    "pushed block": lambda: of_history(pushed_block(1), [0.5, 0.9, 0.0, 0.9]),
+    "pushed block": lambda: of_history(pushed_block(1), [0.9, 0.9]),
     **{f"floating {seed}": lambda seed=seed: of_history(*floating_history(seed)) for seed in (3, 16, 45)},
     "in space": lambda: of_history(*pulled_weights(2)),
 }
