@@ -286,10 +286,6 @@ def test_a_motion_of_nodes_without_contact_and_friction_are_steps_of_a_history(r
     ("cards", "what"),
     [
         ("*BOUNDARY, OP=NEW\nBOTTOM, 1, 2\nSIDE, 1\n", "what is held"),
-        (
-            "*MODEL CHANGE, TYPE=CONTACT PAIR, REMOVE\nABOVE, ON\n*MODEL CHANGE, TYPE=CONTACT PAIR, ADD\nUNDER, ON\n",
-            "which pairs are in contact",
-        ),
         ("*BOUNDARY\nBOTTOM, 2, 2, 0.01\n", "the displacement of nodes that are in contact or faced by such"),
     ],
 )
@@ -300,6 +296,23 @@ def test_steps_that_change_more_than_loads_are_refused(read, cards, what):
     cards = cards if "NEW" in cards else cards.replace("BOTTOM", "LOWEST")
     with pytest.raises(enumsol.InvalidProblemError, match=rf"line \d+: step 2 changes {what}"):
         read(deck(mesh=mesh, held=held, steps=PRESSED + step(cards))).steps()
+
+
+def test_steps_with_other_pairs_in_contact_are_no_history(read):
+    """As many rows in both, of the nodes of the other body in the second."""
+    out, back = (f"*MODEL CHANGE, TYPE=CONTACT PAIR, {word}\n" for word in ("REMOVE", "ADD"))
+    first = step(out + "ON, UNDER\n" + DOWN + PUSH)
+    second = step(out + "UNDER, ON\n" + back + "ON, UNDER\n")
+    contact = CONTACT + "*CONTACT PAIR, INTERACTION=DRY\nON, UNDER\n"
+    plain = read(deck(contact=contact, steps=first + second))  # nodes that face each other: the same laws
+    assert_same(plain.problem(1), by_hand())
+    assert_same(plain.problem(2), by_hand(pairs=[("ON", "UNDER")]))
+    assert len(plain.steps()) == 2
+    mesh = MESH.replace("2, 1., 0.\n", "2, 1.2, 0.\n", 1).replace("5, 1., 1.\n", "5, 1.2, 1.\n", 1)
+    model = read(deck(mesh=mesh, contact=contact, steps=first + second))
+    assert model.problem(1).p == model.problem(2).p
+    with pytest.raises(enumsol.InvalidProblemError, match=r"line \d+: step 2 changes which pairs are in contact"):
+        model.steps()
 
 
 def test_of_several_steps_one_is_named(read):
