@@ -1,7 +1,7 @@
 """Results on stdout and in files: texts, JSON, figures.
 
 What cannot be written after a search is an OutputError, and keeps no other result from being written; what is wrong
-with the name of a file is said before (`enumsol.cli.files`).
+with the name of a file is said before (`enumsol.cli.options`).
 """
 
 from __future__ import annotations
