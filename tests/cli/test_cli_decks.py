@@ -101,7 +101,10 @@ def test_a_bare_mesh_is_no_problem(here, capsys):
 
 
 def test_elements_of_a_bare_mesh_are_ignored_and_results_are_read_in_one_way(here, capsys):
-    mesh = DECK[: DECK.index("*MATERIAL")] + "*NODE\n900, 9., 9.\n901, 9., 10.\n902, 8., 9.\n*ELEMENT, TYPE=S3\n900, 900, 901, 902\n"
+    mesh = (
+        DECK[: DECK.index("*MATERIAL")]
+        + "*NODE\n900, 9., 9.\n901, 9., 10.\n902, 8., 9.\n*ELEMENT, TYPE=S3\n900, 900, 901, 902\n"
+    )
     (here / "mesh.inp").write_text(mesh)
     options = ["--young", "1", "--poisson", "0.3", "--pair", "UNDER:UPPER", "--clamp", "BOTTOM", "--clamp", "TOP"]
     assert main(["solve", "mesh.inp", *options, "--friction", "0.3", "--dry-run"]) == 2
