@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Annotated, Any, NamedTuple
 
 import typer
 
-from enumsol.cli.streams import is_quiet, say
+from enumsol.cli.progress import is_quiet, say
 
 if TYPE_CHECKING:
     from enumsol.fem.deck_scenes import DeckModel

@@ -70,10 +70,13 @@ class StabilitySearch:
     ----------
     stiffness : DynamicStiffness
     motions : Motions
+    most_programs : int
+        Semidefinite programs that are solved at most.
     """
 
     stiffness: DynamicStiffness
     motions: Motions
+    most_programs: int = _PROGRAMS
     _ranges: list[tuple[float, float, tuple[NoMotion, ...]]] = field(default_factory=list)
     programs: int = 0
 
@@ -210,14 +213,14 @@ class StabilitySearch:
         """Parts of a range in which weights and decided nodes do not serve either."""
         look()
         leaves = None
-        if self.programs < _PROGRAMS and low < high:
+        if self.programs < self.most_programs and low < high:
             at = float(np.sqrt(max(low, 1e-3 * high) * high))
             K = self._limit if np.isinf(high) else None if (own := self.stiffness.at(at)) is None else own.mid
             leaves = None if K is None else self._decided(low, high, K, (), ())
         if leaves is not None:
             self._ranges.append((low, high, tuple(leaves)))
             return
-        middle = None if self.programs >= _PROGRAMS else self._middle(low, high, _NARROWEST)
+        middle = None if self.programs >= self.most_programs else self._middle(low, high, _NARROWEST)
         if middle is None:
             yield low, high
             return
@@ -228,7 +231,7 @@ class StabilitySearch:
         self, low: float, high: float, K: Floats, slides: tuple[int, ...], stays: tuple[int, ...]
     ) -> list[NoMotion] | None:
         """Certificates for a range that decide nodes at their limit as far as it takes."""
-        if self.programs >= _PROGRAMS:
+        if self.programs >= self.most_programs:
             return None
         found = self._weights(K, slides, stays)
         if found is not None:
