@@ -18,7 +18,8 @@ from enumsol.decks.reading import described
 from enumsol.decks.states import states_of
 from enumsol.errors import InvalidArgumentError, InvalidProblemError
 from enumsol.fem.deck_joints import DeckJoints
-from enumsol.fem.deck_options import acting, friction, is_plane, shared
+from enumsol.fem.deck_meshes import refuse_carriers
+from enumsol.fem.deck_options import acting, contacts, is_plane, shared
 from enumsol.fem.deck_parts import DeckParts
 from enumsol.fem.deck_stiffness import CODES, with_calculix
 from enumsol.fem.mesh_problems import mesh_scene
@@ -153,14 +154,12 @@ class DeckModel:
 
     def __post_init__(self) -> None:
         states = self._states()
+        refuse_carriers(self.deck)
         self._parts = DeckParts(self.deck)
         common = shared(self.deck, self._parts)
         joints = DeckJoints(self.deck, self._parts, 2 if is_plane(self.deck) else 3)
         common |= joints.options
-        self._options = [
-            {**common, **acting(self.deck, self._parts, state, joints), "friction": friction(self.deck, number)}
-            for number, state in enumerate(states, 1)
-        ]
+        self._options = [{**common, **acting(self.deck, self._parts, state, joints)} for state in states]
 
     def _states(self) -> list[DeckState]:
         steps = self.deck.analysis.steps
@@ -185,8 +184,12 @@ class DeckModel:
 
     @cached_property
     def mesh(self) -> PartedMesh:
-        """Mesh with the parts that the deck names, and those on which something acts."""
-        return self._parts.mesh()
+        """Mesh with the parts that the deck names, and those on which something acts; adjusted to its contacts."""
+        mesh = self._parts.mesh()
+        if all(pair.adjust is None for pair in self.deck.analysis.pairs):
+            return mesh
+        options = {**self._at_nodes(mesh, self._options[0]), **contacts(self.deck, 0)}
+        return self._parts.adjusted(mesh_scene(mesh, **options))
 
     def scene(self, step: int | None = None) -> Scene:
         """Scene at the end of a step (from 1), reached from no load at once; of a deck with one step, that one.
@@ -201,22 +204,23 @@ class DeckModel:
         number = self._number(step)
         if number not in self._scenes:
             try:
-                self._scenes[number] = self._made(self._options[number - 1])
+                self._scenes[number] = self._made({**self._options[number - 1], **contacts(self.deck, number)})
             except InvalidArgumentError as error:
                 raise InvalidProblemError(f"{self.deck.path}: {error}") from error
         return self._scenes[number]
 
     def _made(self, options: dict[str, Any]) -> Scene:
-        if "temperature" in options:
-            options = {**options, "temperature": self._parts.at_nodes(self.mesh, np.array(options["temperature"]))}
+        options = self._at_nodes(self.mesh, options)
         scene = mesh_scene(self.mesh, **options)
-        moved = self._parts.adjusted(scene)
-        if moved is not None:
-            self.mesh = moved
-            scene = mesh_scene(moved, **options)
         if any(piece.free_motions(scene.mesh.points, scene.hold) for piece in scene.moving):
             scene = mesh_scene(self.mesh, **options, max_rigid_displacement="auto")
         return scene if self.assemble is None else with_calculix(scene, self.deck, self._parts.used)
+
+    def _at_nodes(self, mesh: PartedMesh, options: dict[str, Any]) -> dict[str, Any]:
+        """Options with the temperatures of the nodes of the mesh, for those of the deck."""
+        if "temperature" not in options:
+            return options
+        return {**options, "temperature": self._parts.at_nodes(mesh, np.array(options["temperature"]))}
 
     def problem(self, step: int | None = None) -> AnyProblem:
         """Contact problem at the end of a step (from 1), reached from no load at once.
@@ -292,9 +296,9 @@ def _lines(lines: list[int]) -> str:
 
 def _differs(first: AnyProblem, other: AnyProblem) -> str | None:
     """Data that two problems do not share but for load and friction, in words."""
-    if first.n != other.n or first.p != other.p:
-        return "what is held"
-    if (first.A != other.A).nnz:
+    if first.p != other.p or (first.n == other.n and (first.Bn != other.Bn).nnz):
+        return "which pairs are in contact, or what is held"
+    if first.n != other.n or (first.A != other.A).nnz:
         return "what is held"
     if np.any(first.gap != other.gap) or np.any(first.slip_offset != other.slip_offset):
         return "the displacement of nodes that are in contact or faced by such"
