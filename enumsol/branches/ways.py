@@ -159,7 +159,7 @@ class PlaneWay:
             # lambda = 0 is the only solution at every alpha, and every selection holds there: one is enough
             self.candidates = {(OPEN,) * self.exact.p}
             return
-        if self.traced is not None and self.problem.held:
+        if self.traced is not None:
             # pieces that need no tree are found while there is time
             search.closed = self.closed.pieces
             with suppress(TimeOverError), within(Deadline(search.deadline)):
@@ -244,7 +244,7 @@ class PlaneWay:
                 proof = partial(write_graph_proof, *given, "condensed", search.pieces, None)
         stats = GraphStats(
             pieces=len(search.pieces),
-            closed=sum(found.numbers is not None for found in search.pieces),
+            closed=sum(found.closed is not None for found in search.pieces),
             nodes=search.nodes,
             selections=len(candidates),
         )

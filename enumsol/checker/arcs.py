@@ -11,7 +11,7 @@ g vanishes, and indices balance. What a proof leaves open is counted.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 from fractions import Fraction
 from functools import cached_property
 from itertools import pairwise
@@ -20,9 +20,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from enumsol.checker.arc_boxes import Boxes, BoxSelection, alpha_number, check_entries, inside
+from enumsol.proof.leaves import OnlyReference, Unbalanced
 from enumsol.proof.reading import RefusedError, codes_from, names_only, numbers_from, quoted, same, units_from
 from enumsol.support.deadlines import tell
-from enumsol.trusted.arcs.only_branch import only_roots
+from enumsol.trusted.arcs.only_branch import branch_references, only_roots
 from enumsol.trusted.arcs.selection_balls import ArcSelection, ArcSystem
 from enumsol.trusted.over_interval import PieceNumbers
 from enumsol.trusted.selection import CONE_MINUS, CONE_PLUS, NORMAL_FORCE, PENETRATION, SLIP_BACKWARD, SLIP_FORWARD
@@ -38,8 +39,10 @@ if TYPE_CHECKING:
     Span = tuple[Fraction, Fraction, int]
 
 
-#: Entries of the record.
-_ENTRIES = 4
+#: Entries of the record, of a body that nothing holds with those of its form.
+_ENTRIES, _FLOATING_ENTRIES = 4, 5
+#: Into so many parts a piece is cut at most.
+_MOST_SHARES = 1024
 
 
 @dataclass(eq=False)
@@ -86,20 +89,35 @@ class ClaimedArc:
 
 @dataclass(frozen=True)
 class ClosedPiece:
-    """A piece whose solutions are said to lie on the arcs through it."""
+    """A piece whose solutions are said to lie on the arcs through it.
+
+    Attributes
+    ----------
+    a, b : Fraction
+    numbers : PieceNumbers
+    leaves : list of (codes, record)
+        Of a body that nothing holds: below which assignments there is nothing else.
+    """
 
     a: Fraction
     b: Fraction
     numbers: PieceNumbers
+    leaves: list[tuple[Codes, OnlyReference | Unbalanced]] = field(default_factory=list)
 
     @classmethod
-    def read(cls, a: Fraction, b: Fraction, record: list[Any], p: int) -> ClosedPiece:
+    def read(cls, a: Fraction, b: Fraction, record: list[Any], p: int, *, held: bool) -> ClosedPiece:
         """From its record."""
-        if len(record) != _ENTRIES:
-            raise ValueError(f"a record of kind 'm' has {len(record)} entries; expected {_ENTRIES}")
-        numbers = PieceNumbers(*(numbers_from(values, p) for values in record[1:]))
+        expected = _ENTRIES if held else _FLOATING_ENTRIES
+        if len(record) != expected:
+            raise ValueError(f"a record of kind 'm' has {len(record)} entries; expected {expected}")
+        numbers = PieceNumbers(*(numbers_from(values, p) for values in record[1:4]))
+        if not held:
+            balance, share, parts = numbers_from(record[4], 3).tolist()
+            if not (1 <= parts <= _MOST_SHARES and parts == int(parts)):
+                raise ValueError(f"the number of its parts is not among 1 to {_MOST_SHARES}")
+            numbers = replace(numbers, balance=balance, share=share, parts=int(parts))
         if not numbers.usable:
-            raise ValueError("a number mu or kappa is not positive")
+            raise ValueError("a number mu or kappa is not positive, or the factor of the balance negative")
         return cls(a, b, numbers)
 
     def failure(self, arcs: Sequence[ClaimedArc], systems: dict[int, ArcSystem], origin: Fraction | None) -> str | None:
@@ -113,7 +131,21 @@ class ClosedPiece:
             low = self.a if arc.tail is None else max(self.a, arc.tail.zero[0])
             high = self.b if arc.head is None else min(self.b, arc.head.zero[1])
             spans.append((ArcSelection(systems[side], arc.codes), _below(low), -_below(-high)))
-        return None if all(only_roots(spans, self.numbers)) else "its arcs are not proven to hold all its solutions"
+        system = systems[side]
+        proven = all(only_roots(spans, self.numbers)) if not len(system.reach) else self._covered(spans, system)
+        return None if proven else "its arcs are not proven to hold all its solutions"
+
+    def _covered(self, spans: Sequence[tuple[ArcSelection, float, float]], system: ArcSystem) -> bool:
+        """True if every leaf is proven to hold nothing beside the arcs (theory, section 14.16)."""
+        ends = _below(self.a), -_below(-self.b)
+        known = branch_references(spans, self.numbers, ends)
+        for codes, leaf in self.leaves:
+            if isinstance(leaf, Unbalanced):
+                if not system.unbalanced(codes, *ends, leaf.direction):
+                    return False
+            elif not known or not all(leaf.holds(one, codes, system.reach) for one in known):
+                return False
+        return True
 
     def _chain(self, arcs: Sequence[ClaimedArc]) -> list[ClaimedArc] | None:
         """Arcs one after another, of which one holds at every alpha of the piece."""

@@ -126,17 +126,24 @@ class PieceNumbers:
     ----------
     mu, kappa, nu : (p,) arrays
         mu and kappa positive; kappa and nu are read at nodes with friction only.
+    balance, share : float
+        Of a body that nothing holds, the factor of |G d|^2, and c of theory, (14.14).
+    parts : int
+        Into so many parts the piece is cut, in each of which theta is affine.
     """
 
     mu: Floats
     kappa: Floats
     nu: Floats
+    balance: float = 0.0
+    share: float = 0.0
+    parts: int = 1
 
     @property
     def usable(self) -> bool:
         """True if they are numbers, and positive where they must be."""
-        finite = all(np.all(np.isfinite(part)) for part in (self.mu, self.kappa, self.nu))
-        return bool(finite and np.all(self.mu > 0) and np.all(self.kappa > 0))
+        finite = all(np.all(np.isfinite(part)) for part in (self.mu, self.kappa, self.nu, self.balance, self.share))
+        return bool(finite and np.all(self.mu > 0) and np.all(self.kappa > 0) and self.balance >= 0)
 
     def serve(self, largest: Floats) -> bool:
         """True if ``|nu| F <= mu`` for all coefficients up to these."""

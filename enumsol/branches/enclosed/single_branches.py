@@ -1,34 +1,42 @@
 """Pieces of the interval that need no tree: their one branch of solutions is proven to be all (theory, section 7.15).
 
 A branch is followed in floats, selection by selection, and the trusted core tests whether the root of each is the only
-solution where it holds. Then the selections are traced, and their arcs must join to one chain over the pieces.
+solution where it holds; of a body that nothing holds, below assignments that cover all (theory, section 14.16). Then the
+selections are traced, and their arcs must join to one chain over the pieces.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
+from fractions import Fraction
 from itertools import pairwise
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from enumsol.branches.enclosed.joining import EventPlaceKind, Joined, join
+from enumsol.proof.leaves import OnlyReference, Unbalanced
 from enumsol.search.chains import Chains, Link, LoadedSystem, SelectionCurve
 from enumsol.search.reduction import WeightSource
-from enumsol.search.subintervals import Piece, whole_pieces
+from enumsol.search.reference_closer import NUMBERS, Cover, OnlyRoot
+from enumsol.search.solvers import Solvers
+from enumsol.search.subintervals import ClosedPiece, Piece, whole_pieces
+from enumsol.selections.float_selections import SIGN_TOLERANCE
 from enumsol.support.deadlines import look
-from enumsol.trusted.arcs.only_branch import only_roots
+from enumsol.trusted.arcs.only_branch import branch_references, only_roots
+from enumsol.trusted.floating_bounds import motion_against
 from enumsol.trusted.over_interval import PieceNumbers
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
-    from fractions import Fraction
 
     from enumsol.branches.enclosed.cutting import Trace
     from enumsol.branches.enclosed.following import TracedProblem
-    from enumsol.support.array_types import Codes
+    from enumsol.support.array_types import Codes, Floats
     from enumsol.trusted.arcs.selection_balls import ArcSelection
 
+    Span = tuple[ArcSelection, float, float]
+    Leaf = tuple[Codes, OnlyReference | Unbalanced]
     Spans = list[tuple[Codes, float, float]]
 
 #: Halvings of the interval, and of a piece some of whose arcs are not proven to hold all solutions.
@@ -41,6 +49,8 @@ _VAIN_TRIES = 3
 #: Bounds of errors are multiplied by the first, and the form must be definite by the second, so that a checker that
 #: rounds otherwise agrees.
 _ERRORS, _MARGIN = 2.0, 1e-9
+#: Parts into which a piece of a body that nothing holds is cut.
+_PARTS = 1, 4, 16, 64
 
 
 @dataclass
@@ -49,13 +59,13 @@ class ClosedPieces:
 
     Attributes
     ----------
-    pieces : mapping of Piece to (PieceNumbers, codes)
+    pieces : mapping of Piece to ClosedPiece
         In order, with the selections that hold somewhere in them.
     traces : list of Trace
         Of these selections, where they survive.
     """
 
-    pieces: dict[Piece, tuple[PieceNumbers, list[Codes]]] = field(default_factory=dict)
+    pieces: dict[Piece, ClosedPiece] = field(default_factory=dict)
     traces: list[Trace] = field(default_factory=list)
 
     def find(self, traced: TracedProblem) -> None:
@@ -83,7 +93,9 @@ class ClosedPieces:
         origin = traced.origin if traced.origin in ends else None
         joined = join(traces, ends, origin, traced.sharpen, sparing=traced.sparing)
         if _is_chain(joined) and all(_was_tested(joined, proposed) for proposed in stretch):
-            self.pieces |= {p.piece: (p.numbers, [codes for codes, _, _ in p.spans]) for p in stretch}
+            self.pieces |= {
+                p.piece: ClosedPiece(p.numbers, [codes for codes, _, _ in p.spans], p.leaves) for p in stretch
+            }
             self.traces += traces
 
 
@@ -94,6 +106,7 @@ class _Proposed:
     piece: Piece
     numbers: PieceNumbers
     spans: Spans
+    leaves: Sequence[Leaf] = ()
 
 
 def _stretches(proposals: Sequence[_Proposed]) -> list[list[_Proposed]]:
@@ -129,6 +142,10 @@ def _was_tested(joined: Joined, proposed: _Proposed) -> bool:
     return True
 
 
+def _record(why: OnlyRoot | Floats) -> OnlyReference | Unbalanced:
+    return OnlyReference(1, why.rows, why.products) if isinstance(why, OnlyRoot) else Unbalanced(why)
+
+
 class _Proposals:
     """Proposals for one side of an alpha at which g vanishes, or for the whole interval.
 
@@ -141,12 +158,20 @@ class _Proposals:
     def __init__(self, traced: TracedProblem, whole: Piece) -> None:
         self._traced, self._whole = traced, whole
         self._side = traced.spans([(whole.a, whole.b)])[0][2]
-        self._system = LoadedSystem(traced.problem.condensed, traced.units, self._side)
+        held = traced.problem.held
+        self._system = LoadedSystem(
+            traced.problem.on_springs.condensed, traced.units, self._side, None if held else self._root
+        )
+        if not held:
+            self._arcs = arcs = traced.system(self._side)
+            self._system = self._system.bordered(arcs.S.mid, (arcs.g0.mid, arcs.g1.mid), arcs.reach)
         self._chains = Chains(self._system, float(whole.b))
         # how far around a link the test goes, by the length of the interval: its ends are known in floats only
         self._around = 1e-9 * float(whole.b - whole.a)
         ones = np.ones(self._system.p)
         self._numbers = [PieceNumbers(ones, ones, 0.0 * ones)]
+        if not held:
+            self._numbers = [PieceNumbers(mu * ones, ones, 0.0 * ones, balance, mu) for mu, balance in NUMBERS]
         self._vain = _VAIN + self._system.p // _NODES_FOR_ONE
 
     def run(self) -> list[_Proposed]:
@@ -177,6 +202,8 @@ class _Proposals:
             for link in links
         ]
         asked = [(self._traced.selection(codes, self._side), low, high) for codes, low, high in spans]
+        if not self._traced.problem.held:
+            return self._covered(piece, spans, asked), True
         alone = list[bool]()
         for numbers in self._numbers:
             alone = self._only(asked, numbers)
@@ -195,6 +222,30 @@ class _Proposals:
                 return (_Proposed(piece, found, spans) if all(self._only(asked, found)) else None), True
         beside = [(asked[0][0], ends[0], ends[0] + self._around), (asked[-1][0], ends[1] - self._around, ends[1])]
         return None, some or any(self._only(beside, self._numbers[0]))
+
+    def _covered(self, piece: Piece, spans: Spans, asked: Sequence[Span]) -> _Proposed | None:
+        """A piece of a body that nothing holds, with leaves that leave nothing beside its arcs; or None."""
+        system, (low, high) = self._arcs, self._traced.spans([(piece.a, piece.b)])[0][:2]
+
+        def unbalanced(codes: Codes) -> Floats | None:
+            z = motion_against(system.at(low), codes)
+            return z if system.unbalanced(codes, low, high, z) else None
+
+        for numbers in self._numbers:
+            if branch_references(asked, numbers, (low, high), _ERRORS):
+                for parts in _PARTS:
+                    finer = replace(numbers, parts=parts)
+                    references = branch_references(asked, finer, (low, high), _ERRORS)
+                    found = Cover(references).leaves(unbalanced) if references else None
+                    if found is not None:
+                        leaves = [(codes, _record(why)) for codes, why in found]
+                        return _Proposed(piece, finer, spans, leaves)
+                break
+        return None
+
+    def _root(self, alpha: float) -> Codes | None:
+        """The selection of a root of a body that nothing holds."""
+        return Solvers(self._traced.problem, Fraction(alpha), "verified", SIGN_TOLERANCE, None).known_root
 
     def _only(self, asked: Sequence[tuple[ArcSelection, float, float]], numbers: PieceNumbers) -> list[bool]:
         return only_roots(asked, numbers, _ERRORS, _MARGIN)

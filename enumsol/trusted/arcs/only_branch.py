@@ -1,20 +1,24 @@
 """The trusted test of pieces with one solution: along an arc its root is the only one (theory, section 7.15).
 
 At one alpha a solution is the only one if the form (6.9) is definite for numbers theta that serve it. Along an arc
-theta follows the solution, which is known as polynomials in tau with bounds of their errors (theory, section 7.14).
+theta follows the solution, which is known as polynomials in tau with bounds of their errors (theory, section 7.14). Of
+a body that nothing holds the forms say below which assignments it is the only one (theory, section 14.16).
 """
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from itertools import pairwise
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from enumsol.arithmetic.balls import SAFE, TINY, UNIT, Ball, gamma, upper_sum
 from enumsol.trusted.arcs.over_parts import Expansion, bernstein_values, expansions
 from enumsol.trusted.over_interval import PieceNumbers, definite
-from enumsol.trusted.selection import signed
+from enumsol.trusted.reference import PlaneReference
+from enumsol.trusted.selection import Unknowns, signed
 from enumsol.trusted.status_rows import OPEN
+from enumsol.trusted.uniqueness_forms import Multipliers, RootForm
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -62,6 +66,29 @@ def only_roots(asked: Sequence[Span], numbers: PieceNumbers, errors: float = 1.0
     return found
 
 
+def branch_references(
+    asked: Sequence[Span], numbers: PieceNumbers, piece: tuple[float, float], errors: float = 1.0
+) -> list[PlaneReference]:
+    """References along arcs of a body that nothing holds, over the parts of a piece; none where some are not proven.
+
+    Where all of them say that there is no other root below an assignment, there is none at any alpha at which one of
+    the selections has a root. ``asked`` and ``errors`` as for ``only_roots``.
+    """
+    cuts, spans = np.linspace(*piece, numbers.parts + 1)[1:-1].tolist(), list[Any]()
+    for selection, low, high in asked:
+        ends = [low, *(cut for cut in cuts if low < cut < high), high]
+        spans += [(selection, *part) for part in pairwise(ends)]
+    found = list[PlaneReference]()
+    with np.errstate(over="ignore", invalid="ignore", divide="ignore"):
+        for first in range(0, len(spans), _TOGETHER):
+            for expansion in expansions(spans[first : first + _TOGETHER], errors):
+                references = _Along(expansion, numbers).references() if isinstance(expansion, Expansion) else []
+                if not references:
+                    return []
+                found += references
+    return found
+
+
 class _Along:
     """A selection's solution over an interval, t > 0 times its forces and displacements, as polynomials in tau.
 
@@ -82,30 +109,66 @@ class _Along:
         moving, closed, stick = len(self._rows.moving), len(self._rows.closed), len(self._rows.stick)
         self._t, self._apart = z[-1:], z[: moving - len(self._rows.slip)]
         self._normal = z[moving : moving + closed]
-        plus, minus = z[moving + closed : moving + closed + stick], z[moving + closed + stick : -1]
-        self._stuck = (minus - plus) * Ball.exact(np.full((1, 1), 0.5))
+        first, half = moving + closed, Ball.exact(np.full((1, 1), 0.5))
+        self._stuck = (z[first + stick : first + 2 * stick] - z[first : first + stick]) * half
+        # of a body that nothing holds both bounds of its coordinates q follow
+        first, modes = first + 2 * stick, len(self._rows.modes)
+        self._rigid = (z[first + modes : -1] - z[first : first + modes]) * half
         #: No shorter interval will do.
         self.hopeless = False
 
     def alone(self, margin: float) -> bool:
         """True if the form is definite at every alpha, with theta that serves the solution there."""
-        numbers, p = self._numbers, self._system.p
-        if not self.sign:
+        served, S = self._served(), self._system.S
+        if served is None:
             return False
-        friction = [self._affine(self._system.F0, self._system.F1, tau) for tau in self._ends]
-        size = np.maximum(friction[0].size, friction[1].size)
-        if not numbers.serve(size):
-            return False
-        slopes = self._slopes(friction, size)
-        if slopes is None:
-            return False
-        kept = np.concatenate([np.arange(p), p + np.flatnonzero(self._rubbing)])
-        S, here = self._system.S, np.ix_(kept, kept)
-        ends, off = [numbers.multipliers(theta) for theta in slopes[:2]], slopes[2]
-        lost = np.where(off > 0, numbers.kappa * off * ends[0].slip_sizes(S) * SAFE + TINY, 0.0)
+        ends, off, _ = served
+        kept = self._kept.places
+        here = np.ix_(kept, kept)
+        lost = np.where(off > 0, self._numbers.kappa * off * ends[0].slip_sizes(S) * SAFE + TINY, 0.0)
         forms, taken = [end.form(S)[here] for end in ends], ends[0].taken(S, off, lost)[here]
         self.hopeless = not all(definite(form, margin) for form in forms)
         return not self.hopeless and all(definite(form - taken, margin) for form in forms)
+
+    def references(self) -> list[PlaneReference]:
+        """The forms of theory, (14.14), at both ends, between which they are affine; none where one is not definite."""
+        served, system, numbers, kept = self._served(), self._system, self._numbers, self._kept
+        if served is None:
+            return []
+        ends, off, size = served
+        here, lost = np.ix_(kept.places, kept.places), np.zeros(len(kept.places))
+        body = system.contact[here], system.G[:, kept.places]
+        lost[kept.tangential[kept.normal]] = np.where(off > 0, numbers.kappa * off * SAFE + TINY, 0.0)[kept.normal]
+        cost, closed = np.zeros(len(lost)), self._rows.closed
+        # mu lambda_n + nu lambda_t from below
+        room = (numbers.mu - np.abs(numbers.nu) * size * SAFE) / SAFE
+        loaded = _between(self._normal, self._ends)[0] / _between(self._t, self._ends)[1] / SAFE
+        cost[closed] = np.maximum(np.where(self._rubbing, room, numbers.mu)[closed] * loaded / SAFE, 0.0)
+        found = []
+        for end in ends:
+            form, cross = end.form(system.contact)[here], end.cross(system.G, numbers.share)[:, kept.places]
+            made = RootForm.factored(body, form, cross, lost, cost, numbers.balance)
+            if made is None:
+                return []
+            found.append(PlaneReference(system.at(self._series.middle), self._rows.codes, made, kept))
+        return found
+
+    @property
+    def _kept(self) -> Unknowns:
+        """lambda_n of all nodes, lambda_t of those with friction."""
+        p = self._system.p
+        return Unknowns(p, np.arange(p), self._rubbing, np.zeros(p, dtype=np.intp))
+
+    def _served(self) -> tuple[list[Multipliers], Floats, Floats] | None:
+        """D at both ends, by how much theta may be off, and the largest coefficients; None where theta does not serve."""
+        if not self.sign:
+            return None
+        friction = [self._affine(self._system.F0, self._system.F1, tau) for tau in self._ends]
+        size = np.maximum(friction[0].size, friction[1].size)
+        slopes = self._slopes(friction, size) if self._numbers.serve(size) else None
+        if slopes is None:
+            return None
+        return [self._numbers.multipliers(theta) for theta in slopes[:2]], slopes[2], size
 
     def _affine(self, constant: Floats, slope: Floats, tau: float) -> Ball:
         """constant + alpha slope at the alpha of a tau."""
@@ -163,14 +226,15 @@ class _Along:
     def _slips(self, nodes: Indices) -> Ball:
         """t w_t of some nodes: t g - S (t lambda)."""
         system, rows, p, series = self._system, self._rows, self._system.p, self._series
-        length = self._t.mid.shape[1] + 1
-        force = Ball(np.zeros((2 * p, length)), np.zeros((2 * p, length)))
+        shape = len(system.S.mid), self._t.mid.shape[1] + 1
+        force = Ball(np.zeros(shape), np.zeros(shape))
         slipping = self._normal[rows.slip_columns]
         bound = _turned(*self._linear(system.F0[rows.slip], system.F1[rows.slip]), slipping)
         for places, part, signs in (
             (rows.closed, _longer(self._normal), 1.0),
             (p + rows.stick, _longer(self._stuck), 1.0),
             (p + rows.slip, bound, rows.slip_signs[:, None]),
+            (2 * p + rows.modes, _longer(self._rigid), 1.0),
         ):
             force[places] = signed(part, signs)
         g0, g1 = system.g0[p + nodes], system.g1[p + nodes]

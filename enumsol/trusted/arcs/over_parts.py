@@ -169,7 +169,7 @@ def expansions(asked: Sequence[Asked], errors: float = 1.0) -> list[Expansion | 
 
 def _nowhere(selection: ArcSelection, low: float, high: float) -> OverInterval | None:
     """Knowledge of an interval in which no forces of a selection are in balance with the load (theory, (14.7))."""
-    if not selection.unbalanced(low, high):
+    if not selection.system.unbalanced(selection.rows.codes, low, high):
         return None
     unknown = np.zeros(len(selection.rows.conditions), dtype=np.int8)
     return OverInterval(unknown, False, True, 0, (unknown, unknown), unknown)
