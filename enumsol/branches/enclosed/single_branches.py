@@ -227,8 +227,10 @@ class _Proposals:
         """A piece of a body that nothing holds, with leaves that leave nothing beside its arcs; or None."""
         system, (low, high) = self._arcs, self._traced.spans([(piece.a, piece.b)])[0][:2]
 
+        ends = system.at(low), system.at(high)
+
         def unbalanced(codes: Codes) -> Floats | None:
-            z = motion_against(system.at(low), codes)
+            z = motion_against(ends[0], codes, ends[1])
             return z if system.unbalanced(codes, low, high, z) else None
 
         for numbers in self._numbers:

@@ -113,7 +113,7 @@ class ArcSystem:
         if not len(self.reach):
             return False
         ends = [self.at(alpha) for alpha in (low, high)]
-        z = motion_against(ends[0], codes) if z is None else z
+        z = motion_against(ends[0], codes, ends[1]) if z is None else z
         return all(is_unbalanced(end, codes, z) for end in ends)
 
 
