@@ -75,7 +75,7 @@ def write_graph_proof(
             writer.write([kind, _text(leaf.codes), *packed(leaf.rows, leaf.values)])
         if found.closed is not None:
             numbers, beside = found.closed.numbers, found.closed.leaves
-            more = [] if problem.held else [[numbers.balance, numbers.share, numbers.parts]]
+            more = [] if problem.held else [[numbers.balance, numbers.share, numbers.degree]]
             writer.write(["m", *(part.tolist() for part in (numbers.mu, numbers.kappa, numbers.nu)), *more])
             for codes, said in beside:
                 kind, *entries = said.write()

@@ -41,8 +41,8 @@ if TYPE_CHECKING:
 
 #: Entries of the record, of a body that nothing holds with those of its form.
 _ENTRIES, _FLOATING_ENTRIES = 4, 5
-#: Into so many parts a piece is cut at most.
-_MOST_SHARES = 1024
+#: Of theta.
+_MOST_DEGREE = 32
 
 
 @dataclass(eq=False)
@@ -112,10 +112,10 @@ class ClosedPiece:
             raise ValueError(f"a record of kind 'm' has {len(record)} entries; expected {expected}")
         numbers = PieceNumbers(*(numbers_from(values, p) for values in record[1:4]))
         if not held:
-            balance, share, parts = numbers_from(record[4], 3).tolist()
-            if not (1 <= parts <= _MOST_SHARES and parts == int(parts)):
-                raise ValueError(f"the number of its parts is not among 1 to {_MOST_SHARES}")
-            numbers = replace(numbers, balance=balance, share=share, parts=int(parts))
+            balance, share, degree = numbers_from(record[4], 3).tolist()
+            if degree not in range(1, _MOST_DEGREE + 1):
+                raise ValueError(f"the degree of theta is not among 1 to {_MOST_DEGREE}")
+            numbers = replace(numbers, balance=balance, share=share, degree=int(degree))
         if not numbers.usable:
             raise ValueError("a number mu or kappa is not positive, or the factor of the balance negative")
         return cls(a, b, numbers)
@@ -138,7 +138,7 @@ class ClosedPiece:
     def _covered(self, spans: Sequence[tuple[ArcSelection, float, float]], system: ArcSystem) -> bool:
         """True if every leaf is proven to hold nothing beside the arcs (theory, section 14.16)."""
         ends = _below(self.a), -_below(-self.b)
-        known = branch_references(spans, self.numbers, ends)
+        known = branch_references(spans, self.numbers)
         for codes, leaf in self.leaves:
             if isinstance(leaf, Unbalanced):
                 if not system.unbalanced(codes, *ends, leaf.direction):

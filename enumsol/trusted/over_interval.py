@@ -128,8 +128,8 @@ class PieceNumbers:
         mu and kappa positive; kappa and nu are read at nodes with friction only.
     balance, share : float
         Of a body that nothing holds, the factor of |G d|^2, and c of theory, (14.14).
-    parts : int
-        Into so many parts the piece is cut, in each of which theta is affine.
+    degree : int
+        Of theta along an arc, as a polynomial.
     """
 
     mu: Floats
@@ -137,7 +137,7 @@ class PieceNumbers:
     nu: Floats
     balance: float = 0.0
     share: float = 0.0
-    parts: int = 1
+    degree: int = 1
 
     @property
     def usable(self) -> bool:

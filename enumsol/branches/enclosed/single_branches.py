@@ -49,8 +49,8 @@ _VAIN_TRIES = 3
 #: Bounds of errors are multiplied by the first, and the form must be definite by the second, so that a checker that
 #: rounds otherwise agrees.
 _ERRORS, _MARGIN = 2.0, 1e-9
-#: Parts into which a piece of a body that nothing holds is cut.
-_PARTS = 1, 4, 16, 64
+#: Of theta along an arc of a body that nothing holds, one after the other.
+_DEGREES = 1, 2, 4, 8
 
 
 @dataclass
@@ -234,10 +234,10 @@ class _Proposals:
             return z if system.unbalanced(codes, low, high, z) else None
 
         for numbers in self._numbers:
-            if branch_references(asked, numbers, (low, high), _ERRORS):
-                for parts in _PARTS:
-                    finer = replace(numbers, parts=parts)
-                    references = branch_references(asked, finer, (low, high), _ERRORS)
+            if branch_references(asked, numbers, _ERRORS):
+                for degree in _DEGREES:
+                    finer = replace(numbers, degree=degree)
+                    references = branch_references(asked, finer, _ERRORS)
                     found = Cover(references).leaves(unbalanced) if references else None
                     if found is not None:
                         leaves = [(codes, _record(why)) for codes, why in found]
