@@ -247,6 +247,7 @@ class PlaneWay:
             closed=sum(found.closed is not None for found in search.pieces),
             nodes=search.nodes,
             selections=len(candidates),
+            bounded=sum(found.closed.bounded if found.closed else found.system is not None for found in search.pieces),
         )
         return Made(*elements, (*map(str, stops), *reasons), stats, self.exact, tuple(search.pieces), proof)
 

@@ -25,6 +25,7 @@ from enumsol.proof.reading import RefusedError, codes_from, names_only, numbers_
 from enumsol.support.deadlines import tell
 from enumsol.trusted.arcs.only_branch import branch_references, only_roots
 from enumsol.trusted.arcs.selection_balls import ArcSelection, ArcSystem
+from enumsol.trusted.floating_bounds import without_bound
 from enumsol.trusted.over_interval import PieceNumbers
 from enumsol.trusted.selection import CONE_MINUS, CONE_PLUS, NORMAL_FORCE, PENETRATION, SLIP_BACKWARD, SLIP_FORWARD
 from enumsol.trusted.status_rows import FRICTIONLESS, OPEN, SLIP_MINUS, SLIP_PLUS, STICK
@@ -87,7 +88,7 @@ class ClaimedArc:
     head: ClaimedEvent | None = None
 
 
-@dataclass(frozen=True)
+@dataclass(eq=False)
 class ClosedPiece:
     """A piece whose solutions are said to lie on the arcs through it.
 
@@ -97,12 +98,15 @@ class ClosedPiece:
     numbers : PieceNumbers
     leaves : list of (codes, record)
         Of a body that nothing holds: below which assignments there is nothing else.
+    bounded : bool
+        That was shown within the bound of its rigid displacement only.
     """
 
     a: Fraction
     b: Fraction
     numbers: PieceNumbers
     leaves: list[tuple[Codes, OnlyReference | Unbalanced]] = field(default_factory=list)
+    bounded: bool = False
 
     @classmethod
     def read(cls, a: Fraction, b: Fraction, record: list[Any], p: int, *, held: bool) -> ClosedPiece:
@@ -138,13 +142,17 @@ class ClosedPiece:
     def _covered(self, spans: Sequence[tuple[ArcSelection, float, float]], system: ArcSystem) -> bool:
         """True if every leaf is proven to hold nothing beside the arcs (theory, section 14.16)."""
         ends = _below(self.a), -_below(-self.b)
-        known = branch_references(spans, self.numbers)
+        known, free = branch_references(spans, self.numbers), without_bound(system.at(*ends)).reach
         for codes, leaf in self.leaves:
             if isinstance(leaf, Unbalanced):
                 if not system.unbalanced(codes, *ends, leaf.direction):
                     return False
-            elif not known or not all(leaf.holds(one, codes, system.reach) for one in known):
+            elif not known:
                 return False
+            elif not all(leaf.holds(one, codes, free) for one in known):
+                self.bounded = True
+                if not all(leaf.holds(one, codes, system.reach) for one in known):
+                    return False
         return True
 
     def _chain(self, arcs: Sequence[ClaimedArc]) -> list[ClaimedArc] | None:

@@ -131,6 +131,8 @@ class GraphChecker(ProofChecker):
         self._handed: dict[tuple[int, ...], list[tuple[Fraction, Fraction]]] = {}
         self._closed: list[ClosedPiece] = []
         self.interval: tuple[Fraction, Fraction] | None = None
+        #: A piece has leaves of a tree that is not all left to its halves.
+        self._in_trees = False
         self.data: Data = "problem"
         self._arcs: ArcChecker | None = None
         self._friction: list[bool] = []
@@ -146,8 +148,13 @@ class GraphChecker(ProofChecker):
             failures=tuple(self.failures),
             interval=self.interval,
             leaves=self.leaves,
-            within=None if self.problem.held else self.problem.rigid_reach,
+            within=self.problem.rigid_reach if self._bounded else None,
         )
+
+    @property
+    def _bounded(self) -> bool:
+        """True if something was shown within the bound of the rigid displacement only."""
+        return not self.problem.held and (self._in_trees or any(closed.bounded for closed in self._closed))
 
     def _report(self) -> GraphVerificationReport:
         """Counts of what was checked."""
@@ -250,8 +257,10 @@ class GraphChecker(ProofChecker):
             if np.any(piece.roots != UNDECIDED) or other or not whole:
                 self.fail(f"piece {number}: it is decided by its arcs, but not whole, or has other leaves")
             self._closed.append(piece.closed)
-        elif not covers(piece.roots, piece.leaves(), self._friction):
-            self.fail(f"piece {number}: its leaves do not cover all selections")
+        else:
+            self._in_trees |= not np.array_equal(piece.leaves(), piece.leaves("c"))
+            if not covers(piece.roots, piece.leaves(), self._friction):
+                self.fail(f"piece {number}: its leaves do not cover all selections")
         self.selections.update(row.tobytes() for row in handed)
         for row in handed.tolist():
             self._handed.setdefault(tuple(row), []).append((piece.a, piece.b))

@@ -229,10 +229,13 @@ class Cover:
     ----------
     references : sequence of PlaneReference
         One, or those along a branch.
+    reach : (r,) array, optional
+        Bounds of q, by default those of the first system.
     """
 
-    def __init__(self, references: Sequence[PlaneReference]) -> None:
+    def __init__(self, references: Sequence[PlaneReference], reach: Floats | None = None) -> None:
         self._references, reference = references, references[0]
+        self._reach = reference.system.reach if reach is None else reach
         selection = np.array(list({one.selection for one in references}))
         forward = np.count_nonzero(selection == SLIP_PLUS) >= np.count_nonzero(selection == SLIP_MINUS)
         #: Codes of slip with and against the direction in which most nodes slip; with these, open as well.
@@ -259,8 +262,9 @@ class Cover:
     def _closed(self, codes: Codes) -> OnlyRoot | None:
         """Why no other root lies below an assignment; None where that is not proven."""
         with np.errstate(all="ignore"):
-            proposal, reach = proposed(self._references, codes), self._references[0].system.reach
-        alone = (one.is_only_root(codes, proposal.rows, proposal.products, reach) for one in self._references)
+            proposal = proposed(self._references, codes)
+        given = codes, proposal.rows, proposal.products, self._reach
+        alone = (one.is_only_root(*given) for one in self._references)
         return proposal if all(alone) else None
 
     def leaves(self, unbalanced: Callable[[Codes], Floats | None]) -> list[tuple[Codes, OnlyRoot | Floats]] | None:

@@ -96,11 +96,14 @@ class ClosedPiece:
     selections : sequence of codes
     leaves : sequence of (codes, record)
         Of a body that nothing holds, assignments that cover all, below which there is nothing else.
+    bounded : bool
+        That rests on the bound of its rigid displacement.
     """
 
     numbers: PieceNumbers
     selections: Sequence[Codes]
     leaves: Sequence[tuple[Codes, OnlyReference | Unbalanced]] = ()
+    bounded: bool = False
 
 
 class IntervalCertifier:

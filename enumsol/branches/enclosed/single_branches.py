@@ -24,7 +24,7 @@ from enumsol.search.subintervals import ClosedPiece, Piece, whole_pieces
 from enumsol.selections.float_selections import SIGN_TOLERANCE
 from enumsol.support.deadlines import look
 from enumsol.trusted.arcs.only_branch import branch_references, only_roots
-from enumsol.trusted.floating_bounds import motion_against
+from enumsol.trusted.floating_bounds import motion_against, without_bound
 from enumsol.trusted.over_interval import PieceNumbers
 
 if TYPE_CHECKING:
@@ -93,9 +93,7 @@ class ClosedPieces:
         origin = traced.origin if traced.origin in ends else None
         joined = join(traces, ends, origin, traced.sharpen, sparing=traced.sparing)
         if _is_chain(joined) and all(_was_tested(joined, proposed) for proposed in stretch):
-            self.pieces |= {
-                p.piece: ClosedPiece(p.numbers, [codes for codes, _, _ in p.spans], p.leaves) for p in stretch
-            }
+            self.pieces |= {proposed.piece: proposed.closed for proposed in stretch}
             self.traces += traces
 
 
@@ -107,6 +105,12 @@ class _Proposed:
     numbers: PieceNumbers
     spans: Spans
     leaves: Sequence[Leaf] = ()
+    bounded: bool = False
+
+    @property
+    def closed(self) -> ClosedPiece:
+        """What is kept of it."""
+        return ClosedPiece(self.numbers, [codes for codes, _, _ in self.spans], self.leaves, self.bounded)
 
 
 def _stretches(proposals: Sequence[_Proposed]) -> list[list[_Proposed]]:
@@ -233,17 +237,20 @@ class _Proposals:
             z = motion_against(ends[0], codes, ends[1])
             return z if system.unbalanced(codes, low, high, z) else None
 
-        for numbers in self._numbers:
-            if branch_references(asked, numbers, _ERRORS):
-                for degree in _DEGREES:
-                    finer = replace(numbers, degree=degree)
-                    references = branch_references(asked, finer, _ERRORS)
-                    found = Cover(references).leaves(unbalanced) if references else None
-                    if found is not None:
-                        leaves = [(codes, _record(why)) for codes, why in found]
-                        return _Proposed(piece, finer, spans, leaves)
-                break
+        # if possible without the bound of the rigid displacement
+        free = without_bound(system.at(low, high)).reach
+        for degree in _DEGREES:
+            tried = ((one, branch_references(asked, one, _ERRORS)) for one in self._of_degree(degree))
+            numbers, references = next(((one, found) for one, found in tried if found), (self._numbers[0], []))
+            for reach in (free, system.reach) if references else ():
+                found = Cover(references, reach).leaves(unbalanced)
+                if found is not None:
+                    leaves = [(codes, _record(why)) for codes, why in found]
+                    return _Proposed(piece, numbers, spans, leaves, reach is system.reach)
         return None
+
+    def _of_degree(self, degree: int) -> list[PieceNumbers]:
+        return [replace(numbers, degree=degree) for numbers in self._numbers]
 
     def _root(self, alpha: float) -> Codes | None:
         """The selection of a root of a body that nothing holds."""

@@ -140,7 +140,7 @@ class Expansion:
     @cached_property
     def unbalanced(self) -> bool:
         """True if no forces of the selection are in balance with the load anywhere in the interval."""
-        return self.selection.unbalanced(self.low, self.high)
+        return self.selection.system.unbalanced(self.selection.rows.codes, self.low, self.high)
 
     def over(self, low: float, high: float) -> OverInterval:
         """Knowledge of a part of the interval."""

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from enumsol.arithmetic.balls import SAFE, TINY, Ball, solution
+from enumsol.arithmetic.balls import SAFE, TINY, Ball, hull, solution
 from enumsol.condensation.enclosure import CondensedEnclosure, EnclosedSystem, NotEnclosedError, RigidRows
 from enumsol.trusted.floating_bounds import is_unbalanced, motion_against
 from enumsol.trusted.selection import Selection
@@ -97,10 +97,10 @@ class ArcSystem:
         """Rows of the body as a whole, (r, 2p)."""
         return self.S[2 * self.p :, : 2 * self.p]
 
-    def at(self, alpha: float) -> EnclosedSystem:
-        """The system at one alpha, of a body that nothing holds."""
-        F = _affine(Ball.exact(self.F0), Ball.exact(self.F1), alpha)
-        g, S = _affine(self.g0, self.g1, alpha), self.contact
+    def at(self, *alphas: float) -> EnclosedSystem:
+        """The system at one alpha, or in balls that hold all between two, of a body that nothing holds."""
+        F = hull([_affine(Ball.exact(self.F0), Ball.exact(self.F1), alpha) for alpha in alphas])
+        g, S = hull([_affine(self.g0, self.g1, alpha) for alpha in alphas]), self.contact
         zero, one, contact = np.zeros(len(self.reach)), np.ones(len(self.reach)), slice(2 * self.p)
         rows = RigidRows(self.G, g[2 * self.p :], Ball.exact(zero), one, self.reach)
         return EnclosedSystem(S.mid, S.rad, g.mid[contact], g.rad[contact], F.mid, F.rad, rows=rows)
