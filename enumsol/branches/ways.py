@@ -163,7 +163,7 @@ class PlaneWay:
             # pieces that need no tree are found while there is time
             search.closed = self.closed.pieces
             with suppress(TimeOverError), within(Deadline(search.deadline)):
-                self.closed.find(self.traced)
+                self.closed.find(self.traced, search.worker)
         if executor is None:
             search.run()
         else:

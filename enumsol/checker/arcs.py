@@ -114,7 +114,8 @@ class ClosedPiece:
         expected = _ENTRIES if held else _FLOATING_ENTRIES
         if len(record) != expected:
             raise ValueError(f"a record of kind 'm' has {len(record)} entries; expected {expected}")
-        numbers = PieceNumbers(*(numbers_from(values, p) for values in record[1:4]))
+        mu, kappa, nu = (numbers_from(values, p) for values in record[1:4])
+        numbers = PieceNumbers(mu, kappa, nu)
         if not held:
             balance, share, degree = numbers_from(record[4], 3).tolist()
             if degree not in range(1, _MOST_DEGREE + 1):

@@ -251,8 +251,10 @@ class GraphChecker(ProofChecker):
         elif np.any((handed != OPEN) & ((handed == FRICTIONLESS) == np.array(self._friction))):
             self.fail(f"piece {number}: a surviving selection has a status that a node cannot have")
         if piece.closed is not None:
-            other = len(handed) < len(piece.leaves()) or piece.declared is not None
-            covering = np.array([codes for codes, _ in piece.closed.leaves], dtype=np.uint8).reshape(-1, self.problem.p)
+            beside = np.array([codes for codes, _ in piece.closed.leaves], dtype=np.uint8).reshape(-1, self.problem.p)
+            covering = np.concatenate([beside, piece.leaves("x")])
+            empty = 0 if self.problem.held else len(piece.leaves("x"))
+            other = len(handed) + empty < len(piece.leaves()) or piece.declared is not None
             whole = self.problem.held or covers(piece.roots, covering, self._friction)
             if np.any(piece.roots != UNDECIDED) or other or not whole:
                 self.fail(f"piece {number}: it is decided by its arcs, but not whole, or has other leaves")
@@ -297,7 +299,9 @@ class GraphChecker(ProofChecker):
                 raise ValueError(f"a record of kind {kind!r} has {len(record)} entries; expected {kinds[kind]}")
         if not batch:
             return
-        codes = reading.codes_from([record[1] for record in batch], self.problem.p)
+        beside_arcs = piece.closed is not None and not self.problem.held
+        most = BACKWARD if beside_arcs else UNDECIDED
+        codes = reading.codes_from([record[1] for record in batch], self.problem.p, most)
         piece.codes += codes.tobytes()
         piece.kinds += "".join(record[0] for record in batch).encode()
         if len(piece.kinds) >= piece.look:
@@ -310,6 +314,9 @@ class GraphChecker(ProofChecker):
                 texts = (batch[k][2:] for k in empty)
                 terms = [reading.multipliers_from(text, KINDS * self.problem.p) for text in texts]
                 self._exclusions(within, codes[empty], terms)
+                if piece.closed is not None and beside_arcs and not piece.closed.bounded:
+                    margins = exclusion_margins(within.unbounded, Leaves.of(codes[empty], terms))
+                    piece.closed.bounded = not np.all(margins > 0)
 
     def _read_beside_arcs(self, closed: ClosedPiece, record: list[Any]) -> bool:
         """Keep a leaf below which there is nothing beside the arcs; False if the record is none."""

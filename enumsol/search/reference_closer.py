@@ -8,7 +8,7 @@ such assignments first.
 from __future__ import annotations
 
 from functools import cached_property
-from typing import TYPE_CHECKING, Any, NamedTuple, Protocol
+from typing import TYPE_CHECKING, Any, NamedTuple, Protocol, TypeVar
 
 import numpy as np
 
@@ -28,6 +28,8 @@ if TYPE_CHECKING:
     from enumsol.support.array_types import Codes, Floats
     from enumsol.trusted.reference import PlaneReference
 
+#: Why there is no root below an assignment.
+Why = TypeVar("Why")
 #: Factors of products that are tried, relative to the compliance.
 _FACTORS = np.geomspace(2.0**-8, 2.0**8, 17)
 #: Share of the certificates for single nodes and pairs from which the tree is led by them; so many are tried.
@@ -267,25 +269,30 @@ class Cover:
         alone = (one.is_only_root(*given) for one in self._references)
         return proposal if all(alone) else None
 
-    def leaves(self, unbalanced: Callable[[Codes], Floats | None]) -> list[tuple[Codes, OnlyRoot | Floats]] | None:
+    def leaves(
+        self, excluded: Callable[[Codes], Why | None], searched: Callable[[Codes], list[tuple[Codes, Why]] | None]
+    ) -> list[tuple[Codes, OnlyRoot | Why]] | None:
         """Assignments that cover all, with why no other root lies below each of them; None where that is not proven.
 
-        ``unbalanced`` gives a motion that excludes an assignment, or None.
+        ``excluded`` gives a reason why there is none below an assignment, or None; ``searched`` the leaves of a tree
+        below it, with theirs.
         """
         whole = (UNDECIDED,) * self._references[0].system.p
         if (alone := self._closed(whole)) is not None:
             return [(whole, alone)]
-        found: list[tuple[Codes, OnlyRoot | Floats]] = []
+        found: list[tuple[Codes, OnlyRoot | Why]] = []
         waiting = [whole] if self.pays else []
         while waiting:
             look()
             codes = waiting.pop()
-            reason = (self._closed(codes) if self.is_due(codes) else None) or unbalanced(codes)
+            reason = (self._closed(codes) if self.is_due(codes) else None) or excluded(codes)
             if reason is not None:
                 found.append((codes, reason))
             elif (split := self.split(codes)) is not None:
                 node, children = split
                 waiting += [(*codes[:node], code, *codes[node + 1 :]) for code in children]
+            elif (below := searched(codes)) is not None:
+                found += below
             else:
                 return None
         return found or None

@@ -32,7 +32,7 @@ if TYPE_CHECKING:
 
     from enumsol.condensation.condensed import CondensedProblem
     from enumsol.model.problem import ContactProblem
-    from enumsol.proof.leaves import OnlyReference, Unbalanced
+    from enumsol.proof.leaves import Excluded, OnlyReference, Unbalanced
     from enumsol.support.array_types import Codes, Floats
 
 
@@ -102,7 +102,7 @@ class ClosedPiece:
 
     numbers: PieceNumbers
     selections: Sequence[Codes]
-    leaves: Sequence[tuple[Codes, OnlyReference | Unbalanced]] = ()
+    leaves: Sequence[tuple[Codes, OnlyReference | Unbalanced | Excluded]] = ()
     bounded: bool = False
 
 
@@ -126,6 +126,10 @@ class IntervalCertifier:
     def convex(self, piece: Piece, system: IntervalSystem, form: Floats) -> bool:
         """True if the form of these multipliers is proven convex on the piece."""
         return False
+
+    def needs_bound(self, piece: Piece, system: IntervalSystem, leaf: EmptyLeaf) -> bool:
+        """True unless a leaf is excluded without a bound of the rigid displacement."""
+        return True
 
 
 @dataclass(frozen=True)
@@ -303,6 +307,8 @@ class IntervalSearch:
             if task.piece in self.closed:
                 found.closed = self.closed[task.piece]
                 found.selections[:] = found.closed.selections
+                if len(found.closed.leaves):
+                    found.system = self.worker.system(task.piece)
                 self.selections.update(found.selections)
                 cut = []
             elif halves:

@@ -12,12 +12,14 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from fractions import Fraction
+from functools import cached_property
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from enumsol.arithmetic.balls import SAFE, TINY, UNIT, Ball, factor_above, gamma, upper_norm
+from enumsol.arithmetic.balls import SAFE, TINY, UNIT, Ball, factor_above, gamma, hull, upper_norm
 from enumsol.condensation.enclosure import CondensedEnclosure, EnclosedSystem
+from enumsol.trusted.floating_bounds import without_bound
 from enumsol.trusted.quadratic_forms import EnclosedForm
 from enumsol.trusted.status_rows import BACKWARD, FORWARD, ROW_KINDS, STILL, UNDECIDED, row_table
 from enumsol.trusted.uniqueness_forms import Multipliers
@@ -99,6 +101,16 @@ class EnclosedPiece:
         with np.errstate(over="ignore", invalid="ignore"):
             forms = tuple(EnclosedForm.of(system, everything, multipliers, 0.0) for system in systems)
         return replace(self, forms=forms)
+
+    @cached_property
+    def unbounded(self) -> EnclosedPiece:
+        """The same of a body that nothing holds, with a bound beyond which there is no solution in the piece."""
+        first = self.ends[0]
+        g, h = hull([Ball(end.g, end.g_rad) for end in self.ends]), hull([end.rows.h for end in self.ends])
+        F = hull([Ball.exact(self.low), Ball.exact(self.high)])
+        whole = replace(first, g=g.mid, g_rad=g.rad, F=F.mid, F_rad=F.rad, rows=replace(first.rows, h=h))
+        reach = without_bound(whole).reach
+        return replace(self, ends=tuple(end.reaching(reach) for end in self.ends))
 
     def row_signs(self, codes: Indices) -> NDArray[np.int8]:
         """Signs that multipliers may have, (m, p, 9), for (partial) status codes (m, p)."""

@@ -156,7 +156,7 @@ def block_on_slab(push=0.2, slope=1.0):
     count = len(slab.points)
     parts = {"floor": slab.part("bottom"), "slab": slab.part("top")}
     parts |= {name: block.part(side) + count for name, side in SIDES.items()}
-    points, cells = [slab.points, block.points + [1.0, 1.0]], [slab.cells, block.cells + count]
+    points, cells = [slab.points, block.points + 1.0], [slab.cells, block.cells + count]
     both = fem.PartedMesh(np.concatenate(points), np.concatenate(cells), parts)
     return fem.mesh_problem(
         both, young=210.0, poisson=0.3, pairs=[("block", "slab")], clamp="floor", pressure={"roof": 1.0},

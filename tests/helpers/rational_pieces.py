@@ -144,9 +144,7 @@ class FloatingPiece(ClosedPiece):
         rubs = [i in rubbing for i in range(self.p)]
         for chosen in product(*(sides[selection[i]] for i in rubbing)):
             weights = [*self.mu, *(values[i] for values in (self.kappa, self.nu) for i in rubbing), *map(fmpq, chosen)]
-            reference = Reference(
-                forms, rubs, self.scale, selection, weights, exact(self.balance), exact(self.share)
-            )
+            reference = Reference(forms, rubs, self.scale, selection, weights, exact(self.balance), exact(self.share))
             try:
                 _ = reference.numbers
             except Refused:
@@ -155,7 +153,7 @@ class FloatingPiece(ClosedPiece):
                 if kind == "o":
                     reference.check(codes, *rest[1:])
             return
-        need(False, "no theta serves a solution")  # noqa: FBT003
+        need(False, "no theta serves a solution")
 
     @staticmethod
     def _below(selection, codes):

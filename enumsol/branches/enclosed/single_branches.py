@@ -1,26 +1,28 @@
 """Pieces of the interval that need no tree: their one branch of solutions is proven to be all (theory, section 7.15).
 
 A branch is followed in floats, selection by selection, and the trusted core tests whether the root of each is the only
-solution where it holds; of a body that nothing holds, below assignments that cover all (theory, section 14.16). Then the
-selections are traced, and their arcs must join to one chain over the pieces.
+solution where it holds; of a body that nothing holds, below assignments that cover all (theory, section 14.16). Then
+the selections are traced, and their arcs must join to one chain over the pieces.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
 from fractions import Fraction
+from functools import partial
 from itertools import pairwise
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from enumsol.branches.enclosed.joining import EventPlaceKind, Joined, join
-from enumsol.proof.leaves import OnlyReference, Unbalanced
+from enumsol.proof.leaves import Excluded, OnlyReference, Unbalanced
 from enumsol.search.chains import Chains, Link, LoadedSystem, SelectionCurve
+from enumsol.search.interval_tree import EmptyLeaf, Subtree
 from enumsol.search.reduction import WeightSource
 from enumsol.search.reference_closer import NUMBERS, Cover, OnlyRoot
 from enumsol.search.solvers import Solvers
-from enumsol.search.subintervals import ClosedPiece, Piece, whole_pieces
+from enumsol.search.subintervals import ClosedPiece, Piece, Task, Worker, whole_pieces
 from enumsol.selections.float_selections import SIGN_TOLERANCE
 from enumsol.support.deadlines import look
 from enumsol.trusted.arcs.only_branch import branch_references, only_roots
@@ -32,11 +34,12 @@ if TYPE_CHECKING:
 
     from enumsol.branches.enclosed.cutting import Trace
     from enumsol.branches.enclosed.following import TracedProblem
-    from enumsol.support.array_types import Codes, Floats
+    from enumsol.support.array_types import Codes
     from enumsol.trusted.arcs.selection_balls import ArcSelection
 
     Span = tuple[ArcSelection, float, float]
-    Leaf = tuple[Codes, OnlyReference | Unbalanced]
+    Record = OnlyReference | Unbalanced | Excluded
+    Leaf = tuple[Codes, Record]
     Spans = list[tuple[Codes, float, float]]
 
 #: Halvings of the interval, and of a piece some of whose arcs are not proven to hold all solutions.
@@ -51,6 +54,8 @@ _VAIN_TRIES = 3
 _ERRORS, _MARGIN = 2.0, 1e-9
 #: Of theta along an arc of a body that nothing holds, one after the other.
 _DEGREES = 1, 2, 4, 8
+#: Of a tree below an assignment that nothing else excludes.
+_MOST_NODES = 4096
 
 
 @dataclass
@@ -68,8 +73,8 @@ class ClosedPieces:
     pieces: dict[Piece, ClosedPiece] = field(default_factory=dict)
     traces: list[Trace] = field(default_factory=list)
 
-    def find(self, traced: TracedProblem) -> None:
-        """Find those of a problem.
+    def find(self, traced: TracedProblem, worker: Worker | None = None) -> None:
+        """Find those of a problem, with a worker for what of a body that nothing holds needs a tree.
 
         Raises
         ------
@@ -77,7 +82,7 @@ class ClosedPieces:
             At the deadline; what was found by then is kept.
         """
         for whole in whole_pieces(*traced.interval, traced.origin):
-            for stretch in _stretches(_Proposals(traced, whole).run()):
+            for stretch in _stretches(_Proposals(traced, whole, worker).run()):
                 look()
                 self._add_proven(traced, stretch)
 
@@ -146,8 +151,8 @@ def _was_tested(joined: Joined, proposed: _Proposed) -> bool:
     return True
 
 
-def _record(why: OnlyRoot | Floats) -> OnlyReference | Unbalanced:
-    return OnlyReference(1, why.rows, why.products) if isinstance(why, OnlyRoot) else Unbalanced(why)
+def _record(why: OnlyRoot | Record) -> Record:
+    return OnlyReference(1, why.rows, why.products) if isinstance(why, OnlyRoot) else why
 
 
 class _Proposals:
@@ -157,10 +162,11 @@ class _Proposals:
     ----------
     traced : TracedProblem
     whole : Piece
+    worker : Worker or None
     """
 
-    def __init__(self, traced: TracedProblem, whole: Piece) -> None:
-        self._traced, self._whole = traced, whole
+    def __init__(self, traced: TracedProblem, whole: Piece, worker: Worker | None) -> None:
+        self._traced, self._whole, self._worker = traced, whole, worker
         self._side = traced.spans([(whole.a, whole.b)])[0][2]
         held = traced.problem.held
         self._system = LoadedSystem(
@@ -233,9 +239,9 @@ class _Proposals:
 
         ends = system.at(low), system.at(high)
 
-        def unbalanced(codes: Codes) -> Floats | None:
+        def unbalanced(codes: Codes) -> Record | None:
             z = motion_against(ends[0], codes, ends[1])
-            return z if system.unbalanced(codes, low, high, z) else None
+            return Unbalanced(z) if system.unbalanced(codes, low, high, z) else None
 
         # if possible without the bound of the rigid displacement
         free = without_bound(system.at(low, high)).reach
@@ -243,11 +249,28 @@ class _Proposals:
             tried = ((one, branch_references(asked, one, _ERRORS)) for one in self._of_degree(degree))
             numbers, references = next(((one, found) for one, found in tried if found), (self._numbers[0], []))
             for reach in (free, system.reach) if references else ():
-                found = Cover(references, reach).leaves(unbalanced)
+                found = Cover(references, reach).leaves(unbalanced, partial(self._searched, piece))
                 if found is not None:
                     leaves = [(codes, _record(why)) for codes, why in found]
-                    return _Proposed(piece, numbers, spans, leaves, reach is system.reach)
+                    bounded = reach is system.reach or self._need_bound(piece, leaves)
+                    return _Proposed(piece, numbers, spans, leaves, bounded)
         return None
+
+    def _searched(self, piece: Piece, codes: Codes) -> list[tuple[Codes, Record]] | None:
+        """The leaves of a tree below an assignment in which there is nothing; None where there may be something."""
+        if self._worker is None:
+            return None
+        result = self._worker.run(Task(piece, (Subtree(codes),)), _MOST_NODES)
+        if result.selections or result.cut or result.rest:
+            return None
+        return [(leaf.codes, Excluded(leaf.rows, leaf.values)) for leaf in result.empty]
+
+    def _need_bound(self, piece: Piece, leaves: Sequence[Leaf]) -> bool:
+        """True if a leaf of a tree rests on the bound of the rigid displacement."""
+        empty = [EmptyLeaf(codes, *said.terms) for codes, said in leaves if isinstance(said, Excluded)]
+        worker = self._worker
+        needs = (worker is None or worker.leaves.needs_bound(piece, worker.system(piece), leaf) for leaf in empty)
+        return any(needs)
 
     def _of_degree(self, degree: int) -> list[PieceNumbers]:
         return [replace(numbers, degree=degree) for numbers in self._numbers]

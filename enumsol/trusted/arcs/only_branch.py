@@ -130,7 +130,7 @@ class _Along:
             return []
         given, off, size = served
         here, lost = np.ix_(kept.places, kept.places), np.zeros(len(kept.places))
-        body = system.contact[here], system.G[:, kept.places]
+        body = system.contact[here], system.rigid[:, kept.places]
         lost[kept.tangential[kept.normal]] = np.where(off > 0, numbers.kappa * off * SAFE + TINY, 0.0)[kept.normal]
         cost, closed = np.zeros(len(lost)), self._rows.closed
         # mu lambda_n + nu lambda_t from below
@@ -139,7 +139,7 @@ class _Along:
         cost[closed] = np.maximum(np.where(self._rubbing, room, numbers.mu)[closed] * loaded / SAFE, 0.0)
         found = []
         for one in given:
-            form, cross = one.form(system.contact)[here], one.cross(system.G, numbers.share)[:, kept.places]
+            form, cross = one.form(system.contact)[here], one.cross(system.rigid, numbers.share)[:, kept.places]
             made = RootForm.factored(body, form, cross, lost, cost, numbers.balance)
             if made is None:
                 return []
@@ -153,7 +153,7 @@ class _Along:
         return Unknowns(p, np.arange(p), self._rubbing, np.zeros(p, dtype=np.intp))
 
     def _served(self) -> tuple[list[Multipliers], Floats, Floats] | None:
-        """D of every Bernstein coefficient of theta, how far theta may be off, and the largest coefficients of friction.
+        """D of every Bernstein coefficient of theta, how far theta may be off, and the largest friction coefficients.
 
         None where theta does not serve.
         """
@@ -186,8 +186,8 @@ class _Along:
             loaded = self._normal[rows.stick_columns]
             middle, half = 0.5 * (self._ends[1] + self._ends[0]), 0.5 * (self._ends[1] - self._ends[0])
             places = middle - half * np.cos(np.pi * np.arange(degree + 1) / degree)
-            values = [part.mid @ np.vander(places, part.mid.shape[1], increasing=True).T for part in (self._stuck, loaded)]
-            given = np.linalg.solve(np.vander(places, increasing=True), (values[0] / values[1]).T).T
+            shares = _values(self._stuck, places) / _values(loaded, places)
+            given = np.asarray(np.linalg.solve(np.vander(places, increasing=True), shares.T).T, dtype=np.float64)
             theta[rows.stick] = Ball.exact(given)
             # |lambda_t / lambda_n - theta| = |lambda_t - theta lambda_n| / lambda_n
             low, high = _between(_longer(self._stuck, degree) - _multiplied(given, loaded), self._ends)
@@ -254,6 +254,11 @@ def _between(polynomials: Ball, ends: tuple[float, float]) -> tuple[Floats, Floa
     values, error = _bernstein(polynomials, ends)
     least, largest = np.min(values, axis=1), np.max(values, axis=1)
     return least - error - 2 * UNIT * (np.abs(least) + error), largest + error + 2 * UNIT * (np.abs(largest) + error)
+
+
+def _values(polynomials: Ball, places: Floats) -> Floats:
+    """About the values of polynomials at some tau; how far theta is off is bounded."""
+    return np.asarray(polynomials.mid @ np.vander(places, polynomials.mid.shape[1], increasing=True).T)
 
 
 def _longer(polynomials: Ball, by: int = 1) -> Ball:

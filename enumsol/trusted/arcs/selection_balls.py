@@ -93,7 +93,7 @@ class ArcSystem:
         return self.S[inner, inner]
 
     @property
-    def G(self) -> Ball:
+    def rigid(self) -> Ball:
         """Rows of the body as a whole, (r, 2p)."""
         return self.S[2 * self.p :, : 2 * self.p]
 
@@ -102,7 +102,7 @@ class ArcSystem:
         F = hull([_affine(Ball.exact(self.F0), Ball.exact(self.F1), alpha) for alpha in alphas])
         g, S = hull([_affine(self.g0, self.g1, alpha) for alpha in alphas]), self.contact
         zero, one, contact = np.zeros(len(self.reach)), np.ones(len(self.reach)), slice(2 * self.p)
-        rows = RigidRows(self.G, g[2 * self.p :], Ball.exact(zero), one, self.reach)
+        rows = RigidRows(self.rigid, g[2 * self.p :], Ball.exact(zero), one, self.reach)
         return EnclosedSystem(S.mid, S.rad, g.mid[contact], g.rad[contact], F.mid, F.rad, rows=rows)
 
     def unbalanced(self, codes: Sequence[int], low: float, high: float, z: Floats | None = None) -> bool:
