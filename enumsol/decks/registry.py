@@ -71,7 +71,8 @@ class Reading:
             It is not known, or not as expected.
         """
         name = compact(card.name)
-        close = [] if name in CARDS or name in HARMLESS else difflib.get_close_matches(name, CARDS, n=1, cutoff=0.87)
+        is_known = any(name in table for table in (CARDS, HARMLESS, REFUSED))
+        close = [] if is_known else difflib.get_close_matches(name, CARDS, n=1, cutoff=0.87)
         if self.bare and not any(CARDS[own].of_mesh for own in (name, *close) if own in CARDS):
             return
         if name in self.ignore:
@@ -88,9 +89,10 @@ class Reading:
         elif name in HARMLESS:
             self.account(card, f"not used: {HARMLESS[name]}", used=False)
         else:
+            found, without = REFUSED.get(name, ("is not read, and may change the answer", "to do without it"))
             raise card.refused(
-                f"is not read, and may change the answer; expected {f'*{close[0]}' if close else 'other cards'}, or "
-                f'--ignore {card.name.replace(" ", "")} (in Python ignore=["..."]) to do without it'
+                f"{found}; expected {f'*{close[0]}' if close else 'other cards'}, or "
+                f'--ignore {card.name.replace(" ", "")} (in Python ignore=["..."]) {without}'
             )
 
     def account(self, card: Card, became: str, *, used: bool = True) -> None:
@@ -112,6 +114,8 @@ class Rule:
 CARDS: dict[str, Rule] = {}
 #: Cards that change nothing, by their names without blanks, and why.
 HARMLESS: dict[str, str] = {}
+#: Cards that are refused for a reason, by their names without blanks: what they are, and what it means to ignore them.
+REFUSED: dict[str, tuple[str, str]] = {}
 
 
 def card(name: str, *options: str, unused: Collection[str] = (), of_mesh: bool = False) -> Callable[[Reader], Reader]:
@@ -128,6 +132,11 @@ def card(name: str, *options: str, unused: Collection[str] = (), of_mesh: bool =
 def harmless(reason: str, *names: str) -> None:
     """Enter cards that change nothing."""
     HARMLESS.update({compact(name): reason for name in names})
+
+
+def refused(found: str, without: str, *names: str) -> None:
+    """Enter cards that are refused: what they are, and what leaving them out means."""
+    REFUSED.update({compact(name): (found, without) for name in names})
 
 
 def compact(name: str) -> str:

@@ -187,6 +187,20 @@ def read_results(path: str | os.PathLike[str]) -> list[NodalResult]:
     return found
 
 
+def converged_time(path: str | os.PathLike[str]) -> float | None:
+    """Time of the last increment that converged, by the file ``.sta`` that CalculiX writes beside its results.
+
+    None if there is no such file, or none converged. After a run that was broken off the last displacements in a
+    ``.frd`` file are those of an increment that did not converge.
+    """
+    place = file_path(path, "path").with_suffix(".sta")
+    if not place.is_file():
+        return None
+    rows = [line.split() for line in place.read_text(encoding="latin-1").splitlines()]
+    done = [row[4] for row in rows if len(row) == 7 and all(word.isdigit() for word in row[:4])]
+    return float(done[-1]) if done else None
+
+
 def _frd(lines: Iterable[str]) -> Iterator[NodalResult]:
     points: dict[int, list[float]] = {}
     time = 0.0
@@ -229,6 +243,8 @@ def _dat(lines: Iterable[str]) -> Iterator[NodalResult]:
         next(lines, "")
         for row in itertools.takewhile(str.strip, lines):
             number, *components = row.split()
+            if components[-1:] == ["L"]:
+                raise InvalidArgumentError("its displacements are in local axes; expected *NODE PRINT, GLOBAL=YES")
             values[int(number)] = list(map(float, components))[:3]
     for time, values in found.items():
         yield NodalResult(time, np.array(list(values), dtype=np.int64), np.array(list(values.values())), None)

@@ -48,21 +48,27 @@ def judge_records(problem, records):
     try:
         header, kind = records[0], records[0].get("kind")
         need(kind in ("space", "graph"), "an unknown kind of proof")
-        need(header["format"] == "enumsol-proof" and integer(header["version"]) == 2, "another format or version")
-        need(header["problem"] == fingerprint(problem) and integer(header["p"]) == problem.p, "another problem")
-        need(header["data"] == "problem", "other data")
-        data = SpaceData(problem)
-        if data.modes is not None:
-            bound = header["max_rigid_displacement"]
-            need(type(bound) is float and bound == problem.rigid_reach, "another bound of the rigid displacement")
-            need(kind == "space", "no graphs of bodies that nothing holds")
+        data = data_of(problem, header)
         if kind == "graph":
+            need(data.modes is None, "no graphs of bodies that nothing holds")
             return Graph(problem, header, data, units(header, problem.p)[0]).run(records[1:])
         return Point(problem, header, data).run(records[1:])
     except (KeyError, TypeError, ValueError, IndexError, AttributeError, OverflowError, ZeroDivisionError) as error:
         raise Refused(f"a record cannot be read: {error!r}") from error
     finally:
         ctx.prec = before
+
+
+def data_of(problem, header):
+    """[3] The data of the problem of which a header is."""
+    need(header["format"] == "enumsol-proof" and integer(header["version"]) == 2, "another format or version")
+    need(header["problem"] == fingerprint(problem) and integer(header["p"]) == problem.p, "another problem")
+    need(header["data"] == "problem", "other data")
+    data = SpaceData(problem)
+    if data.modes is not None:
+        bound = header["max_rigid_displacement"]
+        need(type(bound) is float and bound == problem.rigid_reach, "another bound of the rigid displacement")
+    return data
 
 
 def floats(values, count):
@@ -267,7 +273,8 @@ class Point:
             near = abs(value - a)
             if not near <= b:
                 need(not near > b, "the root is not in its ball")
-                need(near.upper() <= b + arb(2) ** -200, "the root is not in its ball")
+                if not near.upper() <= b + arb(2) ** -200:
+                    raise Undecided("the root may not be in its ball")
 
     def count(self, root):
         """[5.4]"""

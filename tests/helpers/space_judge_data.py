@@ -58,11 +58,13 @@ def length_of(values):
 
 def fingerprint(problem):
     """[3.4]"""
-    free = problem.rigid_modes is not None
-    digest = hashlib.sha256(b"enumsol problem in 3D, 1" + (b", held by nothing" if free else b""))
+    free, ball = problem.rigid_modes is not None, problem.offset_radius is not None
+    digest = hashlib.sha256(
+        b"enumsol problem in 3D, 1" + (b", from a ball" if ball else b"") + (b", held by nothing" if free else b"")
+    )
 
     def add(values, kind):
-        digest.update(np.asarray(values).astype(kind).tobytes() + b"|")
+        digest.update((np.asarray(values).astype(kind) + 0).tobytes() + b"|")
 
     add([problem.n, problem.p], "<i8")
     for matrix in (problem.A, problem.Bn, problem.Bt1, problem.Bt2):
@@ -75,6 +77,8 @@ def fingerprint(problem):
     for vector in (problem.f, problem.gap, *problem.friction, *problem.friction_slope, slope):
         add(np.asarray(vector) + 0.0, "<f8")
     add(np.ravel(problem.slip_offset) + 0.0, "<f8")
+    if ball:
+        add(np.ravel(problem.offset_radius) + 0.0, "<f8")
     if free:
         add(np.ravel(problem.rigid_modes), "<f8")
         add([problem.rigid_reach], "<f8")
@@ -102,9 +106,13 @@ class SpaceData:
             self.bounds_of(problem, held)
         X = balls(A).solve(balls(B).transpose())
         self.S = balls(B) * X
-        offset = [*problem.gap.tolist(), *np.asarray(problem.slip_offset).T.ravel().tolist()]
-        g0, self.g1 = ((X.transpose() * balls(load).transpose()).entries() for load in loads)
-        self.g0 = [value - arb(shift) for value, shift in zip(g0, offset, strict=True)]
+        self.offset = [arb(x) for x in [*problem.gap.tolist(), *np.asarray(problem.slip_offset).T.ravel().tolist()]]
+        if problem.offset_radius is not None:
+            # [9] from a ball
+            radii = [0.0] * self.p + np.asarray(problem.offset_radius).T.ravel().tolist()
+            self.offset = [a + arb(0, b) for a, b in zip(self.offset, radii, strict=True)]
+        self.free0, self.g1 = ((X.transpose() * balls(load).transpose()).entries() for load in loads)
+        self.g0 = [value - shift for value, shift in zip(self.free0, self.offset, strict=True)]
         if self.modes is not None:
             self.G = self.modes.transpose() * balls(B).transpose()
             self.h0, self.h1 = ((self.modes.transpose() * balls(load).transpose()).entries() for load in loads)

@@ -54,16 +54,22 @@ def test_motions_with_touching_nodes():
     assert counts["undecided"] <= 2, counts
 
 
-@pytest.mark.slow
 def test_degrees_of_freedom_without_mass():
-    counts = compared([(3, k) for k in range(20)], massless=True)
-    assert counts["undecided"] <= 1, counts
+    counts = compared([(3, k) for k in range(12)], massless=True)
+    assert not counts["undecided"], counts
 
 
 @pytest.mark.long
 @pytest.mark.parametrize("part", range(8))
 def test_two_thousand_random_motions(part):
     counts = compared([(4, part, k) for k in range(250)])
+    assert counts["undecided"] <= 5, counts
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("part", range(2))
+def test_five_hundred_with_degrees_of_freedom_without_mass(part):
+    counts = compared([(8, part, k) for k in range(250)], massless=True)
     assert counts["undecided"] <= 5, counts
 
 
