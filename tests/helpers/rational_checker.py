@@ -156,6 +156,8 @@ class Proof:
                 key = "undecided, F = 0"
             elif i in varying and key in (2, 3):
                 key = "slip+" if key == 2 else "slip-"
+            elif i in varying and key in (7, 8):
+                key = 6
             need(kind < len(ALLOWED[key]), "a row does not exist")
             allowed = ALLOWED[key][kind]
             need(allowed == "E" or (allowed == "+" and value >= 0), "a multiplier is not allowed")
@@ -169,6 +171,8 @@ def refinements(code, friction):
         return (0, 1, 2, 3) if friction else (0, 4)
     if code == 5:
         return (1, 2, 3) if friction else ()
+    if code in (7, 8):
+        return (0, code - 5) if friction else ()
     return (code,) if code in ((0, 1, 2, 3) if friction else (0, 4)) else ()
 
 
@@ -430,19 +434,19 @@ class Graph(Proof):
             allowed = {"m", "s", *self.beside_arcs}
             need(kinds.count("m") == 1 and set(kinds) <= allowed, "a piece closed by its arcs holds more than that")
             beside = [(kind, self.codes(text, 8), *rest) for kind, text, *rest in leaves if kind in self.beside_arcs]
-            self.leaves += len(beside)
+            self.leaves += sum(kind != "x" for kind, *_ in beside)
         for kind, text, *rest in leaves:
             if kind == "m":
                 self.closed.append(self.closed_piece(x, y, [text, *rest], beside))
                 continue
-            if closed and kind in self.beside_arcs:
+            if closed and kind in self.beside_arcs and kind != "x":
                 continue
             if kind == "q":
                 declared = [list(map(exact, values)) for values in (text, *rest)]
                 need([len(values) for values in declared] == [self.p] * 4, "a form has another size")
                 need(min(declared[2] + declared[3]) >= 0, "a multiplier of a form is negative")
                 continue
-            codes = self.codes(text)
+            codes = self.codes(text, 8 if closed else 6)
             covered.update(self.selections_below(codes, friction))
             if kind == "x":
                 self.leaves += 1
@@ -501,7 +505,7 @@ class FloatingGraph(Graph):
         super().__init__(problem, header)
         self.same_bound(header)
 
-    beside_arcs = ("o", "i")
+    beside_arcs = ("o", "i", "x")
 
     def closed_piece(self, x, y, lists, beside):
         return FloatingPiece(self.data, x, y, *lists, beside)

@@ -115,7 +115,7 @@ class FloatingPiece(ClosedPiece):
         need(len(more) == 3 and exact(more[2]) in range(1, 33), "a form has another size, or no degree")
         self.balance, self.share, self.leaves = more[0], more[1], leaves
         for kind, _, first, *_ in leaves:
-            need(kind == "i" or first == 1, "a form was not declared")
+            need(kind != "o" or first == 1, "a form was not declared")
 
     def check(self, traces, pairs, origin):
         led = [selection.codes for selection, *_ in self._led(traces, pairs)]
