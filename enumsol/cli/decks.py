@@ -102,6 +102,11 @@ def deck_named(name: str) -> DeckModel:
     return _read(name, place.stat().st_mtime_ns if place.is_file() else 0, _CHOSEN.get())
 
 
+def ignored() -> tuple[str, ...]:
+    """What --ignore names."""
+    return _CHOSEN.get().ignore
+
+
 def step_chosen() -> int | None:
     """The step that --step names."""
     return _CHOSEN.get().step

@@ -18,6 +18,7 @@ from enumsol.decks.reading import described
 from enumsol.decks.states import states_of
 from enumsol.errors import InvalidArgumentError, InvalidProblemError
 from enumsol.fem.deck_joints import DeckJoints
+from enumsol.fem.deck_meshes import refuse_carriers
 from enumsol.fem.deck_options import acting, contacts, is_plane, shared
 from enumsol.fem.deck_parts import DeckParts
 from enumsol.fem.deck_stiffness import CODES, with_calculix
@@ -153,6 +154,7 @@ class DeckModel:
 
     def __post_init__(self) -> None:
         states = self._states()
+        refuse_carriers(self.deck)
         self._parts = DeckParts(self.deck)
         common = shared(self.deck, self._parts)
         joints = DeckJoints(self.deck, self._parts, 2 if is_plane(self.deck) else 3)
