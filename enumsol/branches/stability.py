@@ -13,7 +13,7 @@ from enumsol.search.growing_motions import GrowingMotions
 from enumsol.search.stability import Proven, StabilitySearch
 from enumsol.support.deadlines import look
 from enumsol.trusted.motions_of_body import friction_over
-from enumsol.trusted.running_away import Growing, everywhere
+from enumsol.trusted.running_away import Growing, left_open
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -188,9 +188,9 @@ def _extended(proven: Proven, setting: Setting) -> bool | tuple[float, float]:
             wider = Growing(low, high, tried.way)
             if wider.found(stiffness, motions) is not None:
                 return rate_bounds(low, high)
-    if proven.growing or proven.gaps or not everywhere(proven.ranges):
+    if proven.growing or proven.gaps or left_open(proven.leaves) is not None:
         return False
-    return all(leaf.holds(stiffness, motions) for _, _, leaves in proven.ranges for leaf in leaves)
+    return all(leaf.holds(stiffness, motions) for leaf in proven.leaves)
 
 
 def _joined(spans: Sequence[Span]) -> list[Span]:

@@ -16,7 +16,7 @@ from enumsol.support.arguments import shown
 from enumsol.support.immutable import Sealed
 from enumsol.support.messages import counted
 from enumsol.trusted.motions_of_body import BodyMotions, Setting, friction_directions, friction_over
-from enumsol.trusted.running_away import Motion, everywhere
+from enumsol.trusted.running_away import Motion, left_open
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
@@ -207,8 +207,8 @@ class Stabilities(Equilibria):
         for setting, proven in self.examined(root):
             limits += len(setting.limits)
             gaps += proven.gaps
-            if not (proven.growing or proven.gaps or everywhere(proven.ranges)):
-                gaps.append((0.0, np.inf))
+            if not proven.growing and not proven.gaps and (ends := left_open(proven.leaves)) is not None:
+                gaps.append(ends)
             for _, motion in proven.growing:
                 rate = float(np.sqrt(0.5 * sum(motion.mu)))
                 found.append((rate, rate_bounds(*motion.mu), self._shape(setting, motion)))

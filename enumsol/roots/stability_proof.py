@@ -74,8 +74,7 @@ def _certified(asked: Stabilities, root: Root, found: Stability) -> tuple[str, l
         return RUNS_AWAY, [certificate_record(k, certificate)]
     records = []
     for k, (_, proven) in enumerate(parts):
-        known = dict.fromkeys(leaf for _, _, leaves in proven.ranges for leaf in leaves)
-        records += [certificate_record(k, leaf) for leaf in known]
+        records += [certificate_record(k, leaf) for leaf in dict.fromkeys(proven.leaves)]
     return DOES_NOT, records
 
 
