@@ -251,7 +251,12 @@ class Ball(Pair):
     def _matrix_multiplied(self, other: Ball) -> Ball:
         k = gamma(self.mid.shape[-1] + 4)
         left, right = np.abs(self.mid), np.abs(other.mid)
-        rad = self.rad @ (right + other.rad) + left @ other.rad + k * (left @ right)
+        rad = k * (left @ right)
+        # many matrices are exact, and large ones cost a product each
+        if np.any(other.rad):
+            rad = left @ other.rad + rad
+        if np.any(self.rad):
+            rad = self.rad @ (right + other.rad) + rad
         return Ball(self.mid @ other.mid, rad * (1.0 + k) * SAFE + TINY)
 
     def _added(self, other: Ball) -> Ball:
