@@ -36,7 +36,7 @@ def text_of(found: dict[tuple[int, int], Counter[str]]) -> str:
 
 def main() -> int:
     """Run the comparison."""
-    sys.path[:0] = [str(TESTS), str(TESTS / "roots")]
+    sys.path[:0] = [str(TESTS), str(TESTS / "helpers"), str(TESTS / "roots")]
     from helpers.floating_oracle import Oracle, random_body
     from test_floating_bodies import difference_from_oracle
 

@@ -3,12 +3,11 @@
     python tools/random_in_3d.py 1000 --most 4 --table studies/search_in_3d/results/random.txt
 
 Problem number k has 1 to MOST contact nodes, by k; every third is a body on weak springs (a common motion with a
-stiffness of 1e-6 to 1), the others have strongly coupled nodes. A quarter of the searches is as it is; half go by the
-tree, with the forms of theory, section 12.2, from the beginning, and half of these close subtrees by a lone root; a
-quarter tries forms of products (section 12.11) wherever statuses are final. A complete answer must have an index sum of
-1; proofs are checked of every tenth problem, and every third with forms, lone roots or boxes of products. Newton's
-method and the test of what it finds are those of `tests/helpers/oracles3d.py`. Exit status 1 if a root is missing, an
-index sum is wrong or a proof is refused.
+stiffness of 1e-6 to 1), the others have strongly coupled nodes. A quarter of the searches is as it is; the others go by
+the tree, with the forms of theory, section 12.2, from the beginning, and two thirds of these close subtrees by a lone
+root. A complete answer must have an index sum of 1; proofs are checked of every tenth problem, and every third with
+forms or lone roots. Newton's method and the test of what it finds are those of `tests/helpers/oracles3d.py`. Exit
+status 1 if a root is missing, an index sum is wrong or a proof is refused.
 """
 
 from __future__ import annotations
@@ -35,7 +34,6 @@ COLUMNS = [
     "open",
     "with forms",
     "with lone roots",
-    "with products",
     "proofs checked",
 ]
 #: Common motions of all nodes: along the normal and two tangents.
@@ -56,7 +54,7 @@ def compared(seed: int, given: argparse.Namespace, found: dict[tuple[int, str], 
     from oracles3d import newton_set
     from problems3d import from_compliance, random_coupled, unmatched
     from proof_tools import by_forms, records_of
-    from trees import by_the_tree, closed_in_the_tree, forms_at_once, products_at_once
+    from trees import by_the_tree, closed_in_the_tree, forms_at_once
 
     rng = np.random.default_rng(seed)
     p, soft = given.least + seed % (given.most - given.least + 1), seed % 3 == 0
@@ -64,28 +62,25 @@ def compared(seed: int, given: argparse.Namespace, found: dict[tuple[int, str], 
     problem = from_compliance(data[0], data[1], (data[2][:, 0], data[2][:, 1]))
     with ExitStack() as stack:
         way = rng.integers(4)
-        if way == 3:
-            stack.enter_context(products_at_once())
-        elif way > 0:
+        if way > 0:
             stack.enter_context(by_the_tree() if way == 1 else closed_in_the_tree())
             stack.enter_context(forms_at_once())
         roots = enumsol.enumerate_roots(problem, 0, max_nodes=given.max_nodes)
     records, wrong = records_of(roots.proof)[1:-1], []
     kinds = {record[0] for record in records}
     forms, lone = bool(by_forms(records)), {"b", "a"} <= kinds
-    products = any(record[0] == "l" and len(record) == 8 for record in records)
     if roots.complete:
         # the stiffness is the inverse of S, rounded: that moves roots by more than the enclosures
         loose = 1e-6 + 1e-11 * float(np.linalg.cond(data[0]))
         missed, _ = unmatched(list(roots), newton_set(*data, given.starts, rng), loose)
         wrong += [f"{len(missed)} roots are missing"] if missed else []
         wrong += [f"the index sum is {roots.index_sum}"] if roots.index_sum not in (1, None) else []
-    checked = seed % 10 == 0 or ((forms or lone or products) and seed % 3 == 1)
+    checked = seed % 10 == 0 or ((forms or lone) and seed % 3 == 1)
     if checked:
         report = enumsol.verify(problem, roots.proof)
         wrong += [] if report.ok and report.complete == roots.complete else [f"its proof is refused: {report}"]
     row = found.setdefault((p, "soft" if soft else "coupled"), Counter())
-    counts = (1, bool(wrong), len(roots), len(roots) > 1, not roots.complete, forms, lone, products, checked)
+    counts = (1, bool(wrong), len(roots), len(roots) > 1, not roots.complete, forms, lone, checked)
     row.update(dict(zip(COLUMNS, map(int, counts), strict=True)))
     return wrong
 

@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 
     from enumsol.branches.elements import Arc
     from enumsol.branches.graph import BranchGraph
-    from enumsol.continuation.continuation_options import ContinuationOptions
+    from enumsol.continuation.path_data import ContinuationOptions
     from enumsol.model.problem3d import AnyProblem
     from enumsol.roots.root import Root
     from enumsol.support.array_types import AlphaLike, Floats

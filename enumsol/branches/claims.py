@@ -39,7 +39,7 @@ _WORDS = ("none", "one", "two", "three", "four", "five", "six", "seven", "eight"
 
 
 @dataclass
-class _Tally:
+class _RootCount:
     """Solutions found at one alpha, or at all alphas between two neighbouring floats.
 
     Attributes
@@ -132,7 +132,7 @@ def least_at(alpha: Fraction, vertices: Sequence[Vertex], arcs: Sequence[Arc], *
     """
     point = CriticalAlpha.rational(rational(alpha))
     settled = [v.kind is not VertexKind.UNSETTLED for v in vertices]
-    tally = _Tally(
+    tally = _RootCount(
         index=0 if held else None, vertices=[v for v in vertices if settled[v.number] and v.exact.compare(point) == 0]
     )
     for arc in arcs:
@@ -155,7 +155,7 @@ def least_steps(
     settled = [v for v in vertices if v.kind is not VertexKind.UNSETTLED]
     positions = _Positions(interval, [*(v.exact for v in settled), *(c for arc in arcs for c in (arc.begin, arc.end))])
     over, graze, index, unknown = ([0] * (positions.count + 1) for _ in range(4))
-    here = [_Tally() for _ in range(positions.count)]
+    here = [_RootCount() for _ in range(positions.count)]
     for v in settled:
         for k in positions.clipped(*positions.of(v.exact)):
             here[k].vertices.append(v)

@@ -1,4 +1,4 @@
-"""Parts of a branch graph: vertices, arcs, components and branches (theory, section 7.11).
+"""Parts of a branch graph: vertices, arcs, components and branches (theory, section 7.11), and what bounds the work.
 
 Vertices have their kinds and degrees here, whichever arithmetic they come from.
 """
@@ -7,25 +7,28 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 from fractions import Fraction
-from typing import TYPE_CHECKING, Any, Protocol
+from typing import TYPE_CHECKING, Any, Protocol, TypeVar
 
 import networkx as nx
 import numpy as np
 
 from enumsol.errors import InvalidArgumentError
-from enumsol.model.statuses import OPEN, SLIP_MINUS, SLIP_PLUS, STICK, ContactStatus
+from enumsol.model.statuses import OPEN, SLIP_MINUS, SLIP_PLUS, STICK, ContactStatus, contact_status
 from enumsol.roots.local_branch import ContactState
-from enumsol.roots.root import RootFamily
+from enumsol.roots.root import RootFamily, summary
+from enumsol.search.outcome import StopReason
 from enumsol.support.arguments import alpha_value
+from enumsol.support.deadlines import Deadline, Limited, TimeOverError, look, within
 from enumsol.support.messages import TextEnum
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Sequence, Set
+    from collections.abc import Callable, Iterable, Sequence, Set
 
     from enumsol.arithmetic.algebraic import CriticalAlpha
     from enumsol.support.array_types import AlphaLike, Codes, Floats
 
     Pair = tuple[Floats, Floats]
+    Tick = Callable[[float], object]
 
 
 class VertexKind(TextEnum):
@@ -461,3 +464,62 @@ def make_branches(components: Sequence[Component], vertices: Sequence[Vertex]) -
             along = tuple(vertices[v] for v in (passed[:-1] if closed else passed))
             found.append(Branch(len(found), tuple(run), along, component.number, closed))
     return tuple(found)
+
+
+_Item = TypeVar("_Item")
+
+END_ELSEWHERE = "an interval that ends elsewhere decides it"
+ANOTHER_INTERVAL = "another interval, or data that differ by a little, may decide it"
+SHORT_INTERVAL = "a graph over a short interval around it may decide it"
+MORE_TIME, MORE_NODES = "more time may decide it", "more nodes may decide it"
+TOLD_APART = "data that differ by a little may tell it apart"
+FEWER = "data that differ by a little may leave fewer"
+#: Of what contradicts the search.
+DEFECT = 'arithmetic="verified" decides it if the search was "fast"; otherwise this is a defect: please report it'
+
+
+def named(codes: Codes) -> str:
+    """A selection as text, with the statuses of its nodes in their order."""
+    return f"the selection {summary([contact_status(code, 0.0) for code in codes])}"
+
+
+@dataclass(frozen=True)
+class Effort:
+    """Bounds of the work on arcs.
+
+    Attributes
+    ----------
+    tick : callable, optional
+    limits : Limited
+        What is not worked out by this deadline is left out.
+    ended : StopReason, optional
+        Reason for a bound of the work: the call was ended, and only little more of what it found is worked out.
+    most : int, optional
+        Nothing more is begun after so much.
+    """
+
+    tick: Tick | None = None
+    limits: Limited = field(default_factory=Deadline)
+    ended: StopReason | None = None
+    most: int | None = None
+
+    def over(
+        self, items: Sequence[_Item], together: int, work: Callable[[Sequence[_Item]], object], done: Callable[[], int]
+    ) -> StopReason | None:
+        """Reason why not all items were worked out, so many together; None where they were.
+
+        ``done`` gives how much there is, in the unit of ``most``.
+        """
+        for first in range(0, len(items), together):
+            group = items[first : first + together]
+            if self.most is not None and done() >= self.most:
+                return self.ended
+            try:
+                with within(self.limits):
+                    look()
+                    work(group)
+            except TimeOverError:
+                return self.ended or StopReason.TIME_LIMIT
+            if self.tick is not None:
+                self.tick((first + len(group)) / len(items))
+        return self.ended if self.most == 0 else None

@@ -18,18 +18,29 @@ from networkx.utils import UnionFind
 
 from enumsol.arithmetic.algebraic import CriticalAlpha, merge
 from enumsol.arithmetic.rationals import rational, to_fraction
-from enumsol.branches.elements import Arc, ArcValues, Sides, Vertex, degree_of, make_vertex, sides_of, with_exact_zeros
+from enumsol.branches.elements import (
+    TOLD_APART,
+    Arc,
+    ArcValues,
+    Effort,
+    Sides,
+    Vertex,
+    degree_of,
+    make_vertex,
+    named,
+    sides_of,
+    with_exact_zeros,
+)
 from enumsol.branches.known_selections import KnownSelections
-from enumsol.branches.unfinished import TOLD_APART, Effort, named
 from enumsol.model.statuses import FINAL, OPEN, RowKind, contact_status
 from enumsol.roots.builder import polytope
 from enumsol.roots.components import RootComponent, connected_components
-from enumsol.roots.linearisation import named_statuses, sign_over
+from enumsol.roots.local_branch import named_statuses, sign_over
 from enumsol.roots.root import Polytope, RootFamily
 from enumsol.search.outcome import Stop, StopReason
 from enumsol.selections.functions import SelectionFunctions
-from enumsol.selections.polytopes import dot
 from enumsol.selections.rational_selections import FiberSelections, as_float
+from enumsol.selections.solution import dot
 from enumsol.support.deadlines import TimeOverError, look, tell
 
 if TYPE_CHECKING:

@@ -15,7 +15,7 @@ from flint import fmpq, fmpq_mat, fmpq_poly
 
 from enumsol.arithmetic import algebraic
 from enumsol.arithmetic.algebraic import CriticalAlpha, merge, rational_between, real_roots, sign
-from enumsol.branches.unfinished import DEFECT, FEWER, named
+from enumsol.branches.elements import DEFECT, FEWER, named
 from enumsol.model.statuses import CONDITIONS, FINAL, STICK, RowKind
 from enumsol.selections.functions import SelectionFunctions
 from enumsol.selections.rational_selections import FiberSelections, row_reduce

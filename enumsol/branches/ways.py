@@ -11,13 +11,13 @@ import numpy as np
 from flint import fmpq_mat
 
 from enumsol.arithmetic.rationals import rational
+from enumsol.branches.elements import Effort
 from enumsol.branches.enclosed.following import Followed, TracedProblem, follow_selections, make_traced
 from enumsol.branches.enclosed.single_branches import ClosedPieces
 from enumsol.branches.gluing import glue
 from enumsol.branches.graph_data import GraphStats
 from enumsol.branches.known_selections import KnownSelections
 from enumsol.branches.proof_records import write_graph_proof
-from enumsol.branches.unfinished import Effort
 from enumsol.condensation.data import EXACT_DOF_LIMIT
 from enumsol.condensation.enclosure import NotEnclosedError
 from enumsol.condensation.exact import FAST_EXACT_DOF, ExactCondensed, check_definite
@@ -34,9 +34,8 @@ if TYPE_CHECKING:
     from concurrent.futures import Executor
     from fractions import Fraction
 
-    from enumsol.branches.elements import Arc, Vertex
+    from enumsol.branches.elements import Arc, Tick, Vertex
     from enumsol.branches.enclosed.cutting import Trace
-    from enumsol.branches.unfinished import Tick
     from enumsol.model.problem import ContactProblem
     from enumsol.proof.proof_file import Proof
     from enumsol.search.subintervals import SearchedPiece

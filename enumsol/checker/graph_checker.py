@@ -57,7 +57,7 @@ END = object()
 
 
 @dataclass
-class Piece:
+class PieceLeaves:
     """A piece whose leaves are being read."""
 
     a: Fraction
@@ -239,15 +239,15 @@ class GraphChecker(ProofChecker):
             self.progress(self.leaves)
         return piece.leaves("c"), record
 
-    def _begin(self, record: object) -> Piece:
+    def _begin(self, record: object) -> PieceLeaves:
         if not isinstance(record, dict):
             raise ValueError("no piece begins here")  # noqa: TRY004 (as in reading)
         reading.names_only(record, ("piece", "force", "length", "roots"))
         a, b = interval_from(record["piece"])
         units = reading.units_from(record, self.problem.p)
-        return Piece(a, b, *units, reading.codes_from(record["roots"], self.problem.p))
+        return PieceLeaves(a, b, *units, reading.codes_from(record["roots"], self.problem.p))
 
-    def _read_leaves(self, piece: Piece, batch: list[list[Any]]) -> None:
+    def _read_leaves(self, piece: PieceLeaves, batch: list[list[Any]]) -> None:
         """Record some leaves, the first perhaps a form or the piece's numbers, and check those claimed to be empty."""
         kinds = _ENTRIES if self.problem.held else {kind: _ENTRIES[kind] for kind in _OF_ANY_BODY}
         if batch[0][:1] == [_FORM] and self.problem.held:
@@ -288,7 +288,7 @@ class GraphChecker(ProofChecker):
                 self.fail(f"leaf {self.leaves + number + 1}: its multipliers do not exclude it")
         self.leaves += len(terms)
 
-    def _with_form(self, piece: Piece) -> EnclosedPiece:
+    def _with_form(self, piece: PieceLeaves) -> EnclosedPiece:
         """The data at both ends of the piece, with the form declared last."""
         enclosed = self._enclosed(piece)
         if piece.declared is None:
@@ -297,7 +297,7 @@ class GraphChecker(ProofChecker):
             piece.with_form = enclosed.with_form(piece.declared)
         return piece.with_form
 
-    def _enclosed(self, piece: Piece) -> EnclosedPiece:
+    def _enclosed(self, piece: PieceLeaves) -> EnclosedPiece:
         """The data at both ends of the piece, with S proven positive definite."""
         if piece.enclosed is None:
             piece.enclosed = self._data_on(piece)
@@ -305,7 +305,7 @@ class GraphChecker(ProofChecker):
                 raise reading.RefusedError("S is not proven positive definite")
         return piece.enclosed
 
-    def _data_on(self, piece: Piece) -> EnclosedPiece:
+    def _data_on(self, piece: PieceLeaves) -> EnclosedPiece:
         origin = self._zero if self._zero in (piece.a, piece.b) else None
         return EnclosedPiece.from_enclosure(self.enclosure, piece.a, piece.b, piece.force, piece.length, origin)
 
@@ -320,7 +320,7 @@ def interval_from(ends: object) -> tuple[Fraction, Fraction]:
     return a, b
 
 
-def _check_repetitions(piece: Piece) -> None:
+def _check_repetitions(piece: PieceLeaves) -> None:
     """Refuse a piece that gives a leaf twice: the leaves of a tree are different, and so bounded in number."""
     leaves = piece.leaves()
     if len(np.unique(leaves, axis=0)) < len(leaves):

@@ -27,7 +27,7 @@ _END = object()
 
 
 @dataclass(frozen=True)
-class _Step:
+class _DeclaredStep:
     """A step, as a header describes it."""
 
     alpha: Fraction
@@ -77,7 +77,7 @@ class HistoryChecker(ProofChecker):
     def __init__(self, problem: Any, header: Any, checker: Any, progress: Callable[[int], object] | None) -> None:
         super().__init__()
         self.problem, self.header, self.checker, self.progress = afresh(problem), header, checker, progress
-        self.steps: list[_Step] = []
+        self.steps: list[_DeclaredStep] = []
         self.stages: list[_Stage] = []
         self.bases: dict[int, Any] = {}
 
@@ -126,7 +126,7 @@ class HistoryChecker(ProofChecker):
             raise RefusedError(f"the header cannot be read: {error}") from None
         return int(header["stages"])
 
-    def _step(self, said: Any) -> _Step:
+    def _step(self, said: Any) -> _DeclaredStep:
         alpha, load, friction = said
         shape = self.problem.slip_offset.shape
         size = int(np.prod(shape))
@@ -134,7 +134,7 @@ class HistoryChecker(ProofChecker):
         coefficients = None if friction is None else numbers_from(friction, size).reshape(shape)
         if coefficients is not None and np.any(coefficients < 0):
             raise ValueError("a coefficient of friction is negative")
-        return _Step(rational_from(alpha), given, coefficients)
+        return _DeclaredStep(rational_from(alpha), given, coefficients)
 
     def _stage(self, number: int, count: int, records: Iterator[Any]) -> None:
         stage = self._said(number, count, next(records, _END))

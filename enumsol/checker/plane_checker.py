@@ -21,10 +21,9 @@ from enumsol.proof import leaves as kinds
 from enumsol.proof.proof_file import fraction_text
 from enumsol.proof.reading import RefusedError, data_of, friction_at, rational_from, same, units_from
 from enumsol.proof.records import DeclaredForm, Limits, Tree
-from enumsol.trusted.at_alpha import VerifiedSelection, settled_selection
+from enumsol.trusted.at_alpha import JointRoot, VerifiedSelection, settled_selection, told_apart
 from enumsol.trusted.exclusion import Leaves, Terms, exclusion_margins
 from enumsol.trusted.floating_bounds import without_bound
-from enumsol.trusted.joint_roots import JointRoot, told_apart
 from enumsol.trusted.positions import certain_statuses
 from enumsol.trusted.status_rows import (
     ROW_KINDS,
@@ -40,9 +39,9 @@ if TYPE_CHECKING:
     from enumsol.checker.walk import Test
     from enumsol.proof.records import EnclosureRecord, Record
     from enumsol.support.array_types import Codes, Mask
+    from enumsol.trusted.arcs.precise import PreciseAtAlpha
     from enumsol.trusted.at_alpha import Unsettled
     from enumsol.trusted.positions import Among
-    from enumsol.trusted.precise_at_alpha import PreciseAtAlpha
 
     #: codes of a selection, the vertices of its root set, and its dimension
     Polytope = tuple[tuple[int, ...], list[Any], int]
@@ -104,11 +103,9 @@ class Checker(TreeChecker[EnclosedSystem, "VerifiedSelection | ClosedSolution | 
     def rational(self) -> RationalSystem:
         """The condensed problem in rationals; computed only if a leaf needs it."""
         self._allow_rationals()
-        from enumsol.checker.rational import FloatingRationalSystem, RationalSystem  # python-flint, not always needed
+        from enumsol.checker.rational import RationalSystem  # python-flint, not always needed
 
-        if not self.problem.held:
-            return FloatingRationalSystem(self.problem, self.alpha)
-        return RationalSystem(self.problem, self.alpha, definite=self._definite)
+        return RationalSystem(self.problem, self.alpha, definite=self.problem.held and self._definite)
 
     @cached_property
     def _body(self) -> RationalBody:
@@ -205,7 +202,7 @@ class Checker(TreeChecker[EnclosedSystem, "VerifiedSelection | ClosedSolution | 
         """The problem in many digits; None where that is not to be had, or the proof is about S and g as computed."""
         if self.data == "condensed" or not self.problem.held:
             return None
-        from enumsol.trusted.precise_at_alpha import PreciseAtAlpha  # python-flint, not always needed
+        from enumsol.trusted.arcs.precise import PreciseAtAlpha  # python-flint, not always needed
 
         return PreciseAtAlpha.of(self.problem, self.alpha, self.force, self.length)
 
@@ -308,7 +305,7 @@ class Checker(TreeChecker[EnclosedSystem, "VerifiedSelection | ClosedSolution | 
 
     def _rests_on_reach(self, codes: Codes, points: Sequence[Sequence[Fraction]]) -> bool:
         """True if a selection may hold more without the bounds of the rigid displacement."""
-        return not self.problem.held and self.rational.rests_on_reach(codes, points)  # type: ignore[attr-defined]
+        return not self.problem.held and self.rational.rests_on_reach(codes, points)
 
     def _excluded_in_rationals(self, codes: Codes, said: kinds.Excluded) -> str | None:
         p = self.problem.p

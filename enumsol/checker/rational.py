@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any, Protocol
 import numpy as np
 from flint import fmpq, fmpq_mat
 
-from enumsol.arithmetic.rationals import is_positive_definite, rational
+from enumsol.arithmetic.rationals import is_positive_definite, rational, rational_matrix
 from enumsol.condensation.data import exactly_at
 from enumsol.condensation.enclosure import NotEnclosedError
 from enumsol.condensation.unloaded import exact_matrices, free_displacements, solved
@@ -38,6 +38,9 @@ Vector = list[Any]
 class RationalSystem:
     """S, g and F of a problem at alpha, all rational; S from a solve with the whole of A.
 
+    Of a body that nothing holds, S and g are those of the body on springs, with the r rows of its equilibrium as a
+    whole (theory, section 14.2). Points have 2p + r numbers: the contact forces, then -q.
+
     Parameters
     ----------
     problem : ContactProblem
@@ -52,28 +55,33 @@ class RationalSystem:
     """
 
     def __init__(self, problem: ContactProblem, alpha: Fraction, *, definite: bool = False) -> None:
-        self.p, a = problem.p, rational(alpha)
-        A, B = exact_matrices(problem)
+        self.p, a, held, modes = problem.p, rational(alpha), problem.on_springs, problem.modes
+        A, B = exact_matrices(held)
         self.S = B * solved(A, B.transpose())
         if not definite and not is_positive_definite(self.S):
             raise NotEnclosedError("the condensed compliance S is not positive definite in rational arithmetic")
-        self.g: Vector = [x + a * y for x, y in zip(*free_displacements(problem), strict=True)]
+        self.g: Vector = [x + a * y for x, y in zip(*free_displacements(held), strict=True)]
         self.F: Vector = [rational(F) for F in exactly_at(alpha, *problem.affine_friction)]
+        columns = rational_matrix(modes.N)
+        load = fmpq_mat([[x] for x in _load(problem, a)])
+        #: G, a row for each mode, and h.
+        self.G: list[Vector] = (B * columns).transpose().tolist() if modes.r else []
+        self.h: Vector = (columns.transpose() * load).entries() if modes.r else []
+        self.reach: Vector = [rational(float(x)) for x in modes.reach(problem.rigid_reach)]
         self._S: list[Vector] = self.S.tolist()
         self._inverse: Any = None
-        self.zero = fmpq(0)
 
     @property
     def size(self) -> int:
         """Numbers of a point."""
-        return 2 * self.p
+        return 2 * self.p + len(self.G)
 
     def row(self, kind: int, node: int) -> tuple[Vector, Any]:
-        """A row of ``trusted.status_rows`` as an affine function of lambda: 2p coefficients, and what is added."""
-        p, form = self.p, [fmpq(0)] * (2 * self.p)
-        if kind >= 4:
+        """A row of ``trusted.status_rows`` as an affine function of a point: coefficients, and what is added."""
+        p, form = self.p, [fmpq(0)] * self.size
+        if kind >= 4:  # w = g - S lambda + G'q
             k, sign = (node, -1) if kind == 4 else (p + node, 1 if kind == 5 else -1)
-            return [-sign * s for s in self._S[k]], sign * self.g[k]
+            return [-sign * x for x in (*self._S[k], *(mode[k] for mode in self.G))], sign * self.g[k]
         if kind != 1:
             form[node] = fmpq(1) if kind == 0 else self.F[node]
         if kind != 0:
@@ -81,15 +89,39 @@ class RationalSystem:
         return form, fmpq(0)
 
     def equations(self, codes: Sequence[int]) -> tuple[Any, Vector]:
-        """Matrix and right-hand side of the selection's 2p equations in lambda."""
+        """Matrix and right-hand side of the selection's 2p equations and of G lambda = h."""
         rows = [self.row(kind, i) for i, code in enumerate(codes) for kind in CONDITIONS[code][0]]
-        return fmpq_mat([form for form, _ in rows]), [-constant for _, constant in rows]
+        none = [fmpq(0)] * len(self.G)
+        table = [*(form for form, _ in rows), *([*mode, *none] for mode in self.G)]
+        return fmpq_mat(table), [*(-constant for _, constant in rows), *self.h]
 
     def conditions(self, codes: Sequence[int], point: Vector) -> Vector:
-        """The selection's inequalities at a point, as values that must not be negative."""
+        """The selection's inequalities at a point, as values that must not be negative, and bounds of q."""
+        return [*self.contact_conditions(codes, point), *self.bounds(point)]
+
+    def contact_conditions(self, codes: Sequence[int], point: Vector) -> Vector:
+        """The selection's inequalities at a point."""
         rows = [self.row(kind, i) for i, code in enumerate(codes) for kind in CONDITIONS[code][1]]
         moved = (fmpq_mat([form for form, _ in rows]) * fmpq_mat([[x] for x in point])).entries()
         return [x + constant for x, (_, constant) in zip(moved, rows, strict=True)]
+
+    def bounds(self, point: Vector) -> Vector:
+        """Distances of the rigid displacement from its bounds."""
+        moved = list(zip(point[2 * self.p :], self.reach, strict=True))
+        return [*(most - x for x, most in moved), *(most + x for x, most in moved)]
+
+    def rests_on_reach(self, codes: Sequence[int], points: Sequence[Sequence[Fraction]]) -> bool:
+        """True if a selection, which holds these points, holds others without the bounds of the rigid displacement.
+
+        True as well if it has too many candidate vertices to find out.
+        """
+        if points:
+            ends = [[rational(x) for x in point[2 * self.p :]] for point in points]
+            return any(abs(x) == most for end in ends for x, most in zip(end, self.reach, strict=True))
+        try:
+            return any(point[-1] > 0 for point in hull_of_selections(_Shares(self), codes).points)
+        except HullTooLargeError:
+            return True
 
     def energy_bound_positive(
         self, signs: NDArray[np.int8], rows: Sequence[int], values: Sequence[float], units: Sequence[Fraction]
@@ -136,8 +168,7 @@ class RationalBody:
         self._A, B = exact_matrices(problem)
         self._B: list[Vector] = B.tolist()
         self.F: Vector = [rational(F) for F in exactly_at(alpha, *problem.affine_friction)]
-        slope = [0.0] * problem.n if problem.load_slope is None else problem.load_slope.tolist()
-        self._f = [rational(x) + a * rational(y) for x, y in zip(problem.f.tolist(), slope, strict=True)]
+        self._f = _load(problem, a)
         self._offset = [rational(x) for x in problem.gap.tolist() + problem.slip_offset.tolist()]
         self._moved: dict[tuple[Any, ...], Vector] = {}
 
@@ -353,87 +384,15 @@ def _dimension(points: list[Point]) -> int:
     return int(fmpq_mat([[fmpq(x.numerator, x.denominator) for x in row] for row in rows]).rank())
 
 
-class FloatingRationalSystem(RationalSystem):
-    """S, g and F of the body on springs, and the rows of its equilibrium as a whole (theory, section 14.2).
-
-    Points have 2p + r numbers: the contact forces, then -q.
-
-    Parameters
-    ----------
-    problem : ContactProblem
-    alpha : Fraction
-    """
-
-    def __init__(self, problem: ContactProblem, alpha: Fraction) -> None:
-        super().__init__(problem.on_springs, alpha)
-        modes, a = problem.modes, rational(alpha)
-        if modes.r == 0:
-            raise AssertionError("the body is held")
-        columns = [[rational(x) for x in column] for column in modes.N.T.tolist()]
-        rows = problem.contact_rows.toarray().tolist()
-        slope = [0.0] * problem.n if problem.load_slope is None else problem.load_slope.tolist()
-        load = [rational(x) + a * rational(y) for x, y in zip(problem.f.tolist(), slope, strict=True)]
-        #: G, a row for each mode, and h.
-        self.G = [[_dot(row, column) for row in rows] for column in columns]
-        self.h = [sum((x * y for x, y in zip(load, column, strict=True)), fmpq(0)) for column in columns]
-        self.reach = [rational(float(x)) for x in modes.reach(problem.rigid_reach)]
-
-    @property
-    def size(self) -> int:
-        """Numbers of a point."""
-        return 2 * self.p + len(self.G)
-
-    def row(self, kind: int, node: int) -> tuple[Vector, Any]:
-        """A row as an affine function of a point."""
-        form, constant = super().row(kind, node)
-        if kind < 4:
-            return [*form, *(self.zero for _ in self.G)], constant
-        # w = g - S lambda + G'q
-        place, sign = (node, -1) if kind == 4 else (self.p + node, 1 if kind == 5 else -1)
-        return [*form, *(-sign * mode[place] for mode in self.G)], constant
-
-    def equations(self, codes: Sequence[int]) -> tuple[Any, Vector]:
-        """Matrix and right-hand side of the selection's equations and of G lambda = h."""
-        M, b = super().equations(codes)
-        none = [self.zero for _ in self.G]
-        return fmpq_mat([*M.tolist(), *([*mode, *none] for mode in self.G)]), [*b, *self.h]
-
-    def conditions(self, codes: Sequence[int], point: Vector) -> Vector:
-        """The selection's inequalities at a point, then the bounds of the rigid displacement."""
-        return [*self.contact_conditions(codes, point), *self.bounds(point)]
-
-    def contact_conditions(self, codes: Sequence[int], point: Vector) -> Vector:
-        """The selection's inequalities at a point."""
-        return super().conditions(codes, point)
-
-    def bounds(self, point: Vector) -> Vector:
-        """Distances of the rigid displacement from its bounds."""
-        moved = list(zip(point[2 * self.p :], self.reach, strict=True))
-        return [*(most - x for x, most in moved), *(most + x for x, most in moved)]
-
-    def rests_on_reach(self, codes: Sequence[int], points: Sequence[Sequence[Fraction]]) -> bool:
-        """True if a selection, which holds these points, holds others without the bounds.
-
-        True as well if it has too many candidate vertices to find out.
-        """
-        if points:
-            ends = [[rational(x) for x in point[2 * self.p :]] for point in points]
-            return any(abs(x) == most for end in ends for x, most in zip(end, self.reach, strict=True))
-        try:
-            return any(point[-1] > 0 for point in hull_of_selections(_Shares(self), codes).points)
-        except HullTooLargeError:
-            return True
-
-
 class _Shares:
     """Points (s x, s) with x in a selection without the bounds, 0 <= s <= 1, and s x within the bounds.
 
     Parameters
     ----------
-    system : FloatingRationalSystem
+    system : RationalSystem
     """
 
-    def __init__(self, system: FloatingRationalSystem) -> None:
+    def __init__(self, system: RationalSystem) -> None:
         self._system, self.size = system, system.size + 1
 
     def equations(self, codes: Sequence[int]) -> tuple[Any, Vector]:
@@ -449,5 +408,7 @@ class _Shares:
         return [*scaled, *self._system.bounds(x), share, 1 - share]
 
 
-def _dot(row: list[float], column: Vector) -> Any:
-    return sum((rational(x) * y for x, y in zip(row, column, strict=True) if x), fmpq(0))
+def _load(problem: ContactProblem, alpha: Any) -> Vector:
+    """f + alpha load_slope."""
+    slope = [0.0] * problem.n if problem.load_slope is None else problem.load_slope.tolist()
+    return [rational(x) + alpha * rational(y) for x, y in zip(problem.f.tolist(), slope, strict=True)]

@@ -16,8 +16,8 @@ from enumsol.proof.leaves import Alone, BoxedRoot, Excluded, OnlyReference
 from enumsol.proof.reading import RefusedError, data_of, rational_from, shown_alpha, units_from
 from enumsol.proof.records import DeclaredForm, Limits, Tree
 from enumsol.trusted.space.boxed_solution import Box, BoxedSolution, apart_in_boxes, is_inside, solution_in_box
+from enumsol.trusted.space.force_bound import unbounded
 from enumsol.trusted.space.leaves import Open, SpaceRoot, distinct_roots, settle
-from enumsol.trusted.space.resultants import unbounded
 from enumsol.trusted.space.sector_rows import OPEN, STICK, is_sector_covering
 from enumsol.trusted.space.space_uniqueness import LooseSolution
 

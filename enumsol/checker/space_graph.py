@@ -3,9 +3,9 @@
 Records: a header ``{"format": "enumsol-proof", "version": 2, "kind": "graph", "problem": <fingerprint>, "interval":
 [a, b], "p": p, "data": "problem", "force", "length", "steps"}`` with the steps of the coordinates (see AlphaProblem);
 for every curve ``{"curve": n}`` with n boxes, and these as ``["w", centre, direction, border, radius, rho, half]``
-between n + 1 boxes without length around the points that they share (see ``trusted.space.curve_chains``), and perhaps
+between n + 1 boxes without length around the points that they share (see ``trusted.space.curve_runs``), and perhaps
 how it is cut into arcs (see below);
-``{"tree": true}`` and the records of a tree (see ``checker.piece_tree``), whose boxes are numbered in the order of the
+``{"tree": true}`` and the records of a tree of ``PieceTreeChecker``, whose boxes are numbered in the order of the
 curves, points left out; at the end ``{"curves", "arcs", "leaves", "gaps"}``, arcs null where not all curves are cut. Of
 a body that nothing holds the header has ``max_rigid_displacement``, too, and boxes have its rigid displacement.
 
@@ -22,40 +22,142 @@ one may be null where a box is known, the last one of "c" where the part's own b
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any, cast
 
 import numpy as np
 
 from enumsol.checker.graph_checker import END, GraphChecker, interval_from
-from enumsol.checker.piece_tree import PieceTreeChecker
 from enumsol.checker.reports import GraphVerificationReport
 from enumsol.condensation.data import exactly_at
 from enumsol.condensation.enclosure import CondensedEnclosure
-from enumsol.proof.curve_records import CurvePart, box_from
+from enumsol.condensation.space_condensed import AlphaSpace
+from enumsol.proof.curve_records import CurvePart, CutPiece, OnCurve, ThroughCurveBox, box_from
+from enumsol.proof.leaves import Excluded, NoRoot, Unbalanced, UndecidedRecord, kind_of
 from enumsol.proof.reading import RecordError, RefusedError, data_of, numbers_from, quoted, same, units_from
-from enumsol.proof.records import Limits
-from enumsol.trusted.space.curve_chains import apart, chain_of
-from enumsol.trusted.space.curve_events import CurveMotion
-from enumsol.trusted.space.curve_parts import LinkParts, arcs_over, in_order, up_to_bound
-from enumsol.trusted.space.curve_runs import KnownCurve
-from enumsol.trusted.space.sector_rows import UNDECIDED
+from enumsol.proof.records import Branching, Limits, Tree
+from enumsol.trusted.space.curve_parts import CurveMotion, LinkParts, arcs_over, in_order, up_to_bound
+from enumsol.trusted.space.curve_runs import KnownCurve, apart, chain_of
+from enumsol.trusted.space.pieces import AlphaPiece
+from enumsol.trusted.space.sector_rows import UNDECIDED, is_sector_covering
 from enumsol.trusted.space.solution_curve import AlphaProblem, only_curve
+from enumsol.trusted.space.space_uniqueness import is_complete
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Sequence
+    from collections.abc import Callable, Iterator, Sequence
     from fractions import Fraction
 
     from numpy.typing import NDArray
 
     from enumsol.model.problem3d import ContactProblem3D
     from enumsol.proof.curve_records import CurveBoxRecord
-    from enumsol.support.array_types import Codes
-    from enumsol.trusted.space.curve_chains import CurveChain, CurveLink
+    from enumsol.proof.records import Record
     from enumsol.trusted.space.curve_parts import Place, Run, Turn
+    from enumsol.trusted.space.curve_runs import CurveChain, CurveLink
     from enumsol.trusted.space.solution_curve import SolutionCurve
 
     Array = NDArray[np.float64]
+    Codes = tuple[int, ...]
+
+
+@dataclass
+class PieceTreeChecker:
+    """Checks one tree over an interval.
+
+    Attributes
+    ----------
+    enclosure : CondensedEnclosure
+    units : force and length, (p,) arrays of powers of two
+    curves : sequence of KnownCurve
+        Each is proven to be one. Their boxes are numbered in this order.
+    fail : called with what a leaf does not prove
+    leaves : int
+    gaps : list of (low, high)
+        Pieces of open leaves.
+    """
+
+    enclosure: CondensedEnclosure
+    units: tuple[Array, Array]
+    curves: Sequence[KnownCurve]
+    fail: Callable[[str], object]
+    leaves: int = 0
+    gaps: list[tuple[Fraction, Fraction]] = field(default_factory=list)
+
+    def run(self, low: Fraction, high: Fraction, records: Iterator[Any]) -> None:
+        """Check the records of the tree over [low, high]; none is read after its last one.
+
+        Raises
+        ------
+        RefusedError
+            They are no tree.
+        """
+        problem, self._interval = self.enclosure.problem, (low, high)
+        pairs = list(zip(problem.friction, problem.friction_slope, strict=True))
+        ends = [[exactly_at(end, *pair) for end in (low, high)] for pair in pairs]
+        occurs = [[max(values) > 0 for values in zip(*both, strict=True)] for both in ends]
+        self._tangents = [one + other for one, other in zip(*occurs, strict=True)]
+        #: The curve of every box, and which one of its links it is.
+        self._boxes = [(known, k) for known in self.curves for k in range(len(known.chain.links))]
+        waiting: list[tuple[Fraction, Fraction, Codes]] = [(low, high, (UNDECIDED,) * problem.p)]
+        space = AlphaSpace(self.enclosure, (low + high) / 2, self.units)
+        piece = AlphaPiece(space, low, high)
+        while waiting:
+            low, high, codes = waiting.pop()
+            if (low, high) != (piece.low, piece.high):
+                piece = AlphaPiece(space, low, high)
+            record = next(records, None)
+            if not isinstance(record, list):
+                raise RefusedError("the tree over alpha ends before all of it is decided")
+            try:
+                waiting += self._below(piece, codes, record)[::-1]
+            except ValueError as error:
+                raise RefusedError(f"leaf {self.leaves + 1} of the tree over alpha: {error}") from None
+
+    def _below(self, piece: AlphaPiece, codes: Codes, record: list[Any]) -> list[tuple[Fraction, Fraction, Codes]]:
+        """Cells that a record leaves to those after it; none if it is a leaf, which is checked."""
+        kind = record[0] if record else None
+        if kind == CutPiece.kind:
+            alpha = CutPiece.read(record, Limits(codes)).between(piece.low, piece.high)
+            return [(piece.low, alpha, codes), (alpha, piece.high, codes)]
+        if kind == Branching.kind:
+            split = Branching.covering(record, codes, self._covers)
+            return [(piece.low, piece.high, below) for below in split.below(codes)]
+        tree = Tree.PIECE if self.enclosure.problem.held else Tree.FLOATING_PIECE
+        known = kind_of(record, tree)
+        if known is None:
+            raise RecordError(f"unknown kind of record {quoted(kind)}")
+        components, modes = len(codes) + sum(self._tangents), self.enclosure.problem.modes.r
+        leaf = known.read(record, Limits(codes, tree, components=components, modes=modes, boxes=len(self._boxes)))
+        self.leaves += 1
+        if isinstance(leaf, UndecidedRecord):
+            self.gaps.append((piece.low, piece.high))
+        elif (why := self._wrong(piece, codes, leaf)) is not None:
+            self.fail(f"leaf {self.leaves} of the tree over alpha: {why}")
+        return []
+
+    def _covers(self, node: int, code: int, children: list[int]) -> bool:
+        return is_sector_covering(code, children, self._tangents[node])
+
+    def _wrong(self, piece: AlphaPiece, codes: Codes, leaf: Record) -> str | None:
+        """Sentence on what a leaf does not prove; None if all is proven."""
+        if isinstance(leaf, Excluded):
+            return None if leaf.holds(piece, codes) else "its multipliers do not exclude it"
+        if isinstance(leaf, Unbalanced):
+            return None if leaf.holds(piece, codes) else "forces may be in balance"
+        by_form = isinstance(leaf, OnCurve) and leaf.numbers is not None
+        if not by_form and not is_complete(piece.whole, codes):
+            return "its statuses are not final"
+        if isinstance(leaf, NoRoot):
+            return None if piece.narrowed(codes)[1] is None else "it is not proven to hold no root"
+        if isinstance(leaf, OnCurve):
+            where = "it is not proven that all its solutions lie on its curve"
+            where = where if by_form else "its roots are not proven to lie in its boxes"
+            return None if leaf.holds(piece, codes, self._boxes) else where
+        if isinstance(leaf, ThroughCurveBox):
+            met = leaf.holds(piece, codes, self._boxes, self._interval)
+            return None if met else "its roots are not proven to be an arc through its box"
+        raise AssertionError(leaf)
+
 
 #: More boxes of one curve than this are no honest proof's.
 _MOST_BOXES = 1 << 20

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal, NoReturn
 import typer
 
 from enumsol.cli.common import ExitStatus, finish, load_problem, parse_alpha, parse_interval, scene_of, so_far
+from enumsol.cli.decks import deck_named, is_deck, step_chosen
 from enumsol.cli.graph import build, read_graph
 from enumsol.cli.options import Argument, Arithmetic, Number, OutputFile, Problem, Quiet
 from enumsol.cli.output import deliver
@@ -23,11 +24,14 @@ if TYPE_CHECKING:
     from enumsol.auditing import AuditReport, PointRun
     from enumsol.branches import BranchGraph
     from enumsol.checker.reports import AnyReport
+    from enumsol.io.calculix import NodalResult
     from enumsol.model.problem3d import AnyProblem
     from enumsol.support.array_types import Alpha
 
 #: Endings of results of CalculiX.
 _RESULTS = (".frd", ".dat")
+#: Times that differ by less than this part are the same: files have six digits.
+_SAME_TIME = 1e-5
 #: As of ``read_points``, which is not imported for --help.
 Columns = Literal["auto", "rows", "labels"]
 
@@ -64,7 +68,8 @@ def audit(
     the file has five digits. If it stops at a small residual, the error of the forces may be larger. Solutions that are
     closer to each other than the tolerance, and jumps between them, cannot be distinguished.
 
-    Results: of a file .frd or .dat of CalculiX the displacements of its last increment are compared with those of all
+    Results: of a file .frd or .dat of CalculiX the displacements at the end of the step of a deck, or else those of its
+    last increment (that converged, by the file .sta beside it, if there is one), are compared with those of all
     roots at one alpha, which is told which of them it is, and which ones it is not. The tolerance is then the largest
     difference of a displacement in parts of the largest displacement, by default 0.05; the result has to be nearer to
     the root than half way to any other. The exit status is 0 if it is one of the roots, else 3.
@@ -122,10 +127,11 @@ def _audit_result(
 ) -> NoReturn:
     """Compare a result of CalculiX with all roots, and end the command."""
     from enumsol.auditing.results import TOLERANCE, compare_result
-    from enumsol.io.calculix import read_results
+    from enumsol.io.calculix import converged_time, read_results
     from enumsol.roots.enumerate import enumerate_roots
 
-    result = read_results(file)[-1]
+    results, converged = read_results(file), converged_time(file)
+    result, requested = _asked_for(name, results, converged)
     body, about = load_problem(name), scene_of(name)
     if body.mesh is None:
         raise InvalidArgumentError(f"{name} has no mesh; expected a problem made of one, to compare with {file}")
@@ -140,10 +146,36 @@ def _audit_result(
     compared = compare_result(body, found, moved, tolerance=TOLERANCE if tolerance is None else tolerance)
     deliver(
         json_file=json_file,
-        text=lambda: f"{file} at time {result.time:g}: {compared}",
-        content=lambda: {"problem": name, "file": file, "time": result.time, **compared.summary()},
+        text=lambda: f"{file} at time {result.time:g}: {compared}{_broken_off(result.time, requested, converged)}",
+        content=lambda: {
+            **{"problem": name, "file": file, "time": result.time, "requested_time": requested},
+            **compared.summary(),
+        },
     )
     finish(ended, ExitStatus.INCOMPLETE if compared.found is None else ExitStatus.DONE)
+
+
+def _asked_for(name: str, results: list[NodalResult], converged: float | None) -> tuple[NodalResult, float | None]:
+    """The result at the end of the step of a deck, or else the last that converged, and the time that it should have.
+
+    The time is None where it is not known: of a problem that is no deck, and of a run that went on for longer.
+    """
+    known = [result for result in results if converged is None or result.time <= converged * (1 + _SAME_TIME)]
+    last = (known or results)[-1]
+    times = deck_named(name).times if is_deck(name) else []
+    if not times or max(results[-1].time, converged or 0.0) > times[-1] * (1 + _SAME_TIME):
+        return last, None
+    requested = times[(step_chosen() or len(times)) - 1]
+    at = [result for result in known if abs(result.time - requested) <= _SAME_TIME * requested]
+    return (at[-1] if at else last), requested
+
+
+def _broken_off(time: float, requested: float | None, converged: float | None) -> str:
+    """A line on a run that was broken off."""
+    if requested is not None and time < requested * (1 - _SAME_TIME):
+        ended = "" if converged is None else f"; the last increment that converged ended at time {converged:g}"
+        return f"\nthe run was broken off, or writes no end of its step: time {requested:g} was asked for{ended}"
+    return ""
 
 
 def _read_runs(points: str, problem: AnyProblem, columns: Columns) -> Sequence[PointRun]:

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Annotated, Any, NamedTuple
 
 import typer
 
-from enumsol.cli.streams import is_quiet, say
+from enumsol.cli.progress import is_quiet, say
 
 if TYPE_CHECKING:
     from enumsol.fem.deck_scenes import DeckModel
@@ -22,6 +22,9 @@ DECK = ".inp"
 _PANEL = "Decks"
 _IGNORE = "Card of an .inp PROBLEM that is left out though it may change the answer; may be repeated."
 _STEP = "Step of an .inp PROBLEM whose load acts, reached from no load at once; required if it has several."
+_ASSEMBLE = (
+    "Code that assembles the stiffness of an .inp PROBLEM: ccx, an installed CalculiX, which knows all its elements."
+)
 #: Options of every command with a PROBLEM.
 OPTIONS = [
     Parameter(
@@ -40,6 +43,14 @@ OPTIONS = [
             int | None, typer.Option("--step", min=1, metavar="N", help=_STEP, rich_help_panel=_PANEL)
         ],
     ),
+    Parameter(
+        "assemble",
+        Parameter.KEYWORD_ONLY,
+        default=None,
+        annotation=Annotated[
+            str | None, typer.Option("--assemble", metavar="CODE", help=_ASSEMBLE, rich_help_panel=_PANEL)
+        ],
+    ),
 ]
 
 
@@ -48,6 +59,7 @@ class _Chosen(NamedTuple):
 
     ignore: tuple[str, ...] = ()
     step: int | None = None
+    assemble: str | None = None
 
 
 _CHOSEN: ContextVar[_Chosen] = ContextVar("enumsol_deck", default=_Chosen())  # noqa: B039 (it is immutable)
@@ -61,8 +73,10 @@ def with_decks(
         return command, parameters
 
     @wraps(command)
-    def chosen(*, ignore: list[str] | None = None, deck_step: int | None = None, **given: Any) -> None:
-        token = _CHOSEN.set(_Chosen(tuple(ignore or ()), deck_step))
+    def chosen(
+        *, ignore: list[str] | None = None, deck_step: int | None = None, assemble: str | None = None, **given: Any
+    ) -> None:
+        token = _CHOSEN.set(_Chosen(tuple(ignore or ()), deck_step, assemble))
         try:
             command(**given)
         finally:
@@ -85,7 +99,12 @@ def deck_named(name: str) -> DeckModel:
         It cannot be read, or has what cannot be used and no option --ignore names.
     """
     place = Path(name)
-    return _read(name, place.stat().st_mtime_ns if place.is_file() else 0, _CHOSEN.get().ignore)
+    return _read(name, place.stat().st_mtime_ns if place.is_file() else 0, _CHOSEN.get())
+
+
+def ignored() -> tuple[str, ...]:
+    """What --ignore names."""
+    return _CHOSEN.get().ignore
 
 
 def step_chosen() -> int | None:
@@ -97,15 +116,16 @@ def options_said() -> str:
     """The options of decks that were given, as they stand on a command line."""
     chosen = _CHOSEN.get()
     cards = "".join(f" --ignore {shlex.quote(card)}" for card in chosen.ignore)
-    return cards + ("" if chosen.step is None else f" --step {chosen.step}")
+    cards += "" if chosen.step is None else f" --step {chosen.step}"
+    return cards + ("" if chosen.assemble is None else f" --assemble {shlex.quote(chosen.assemble)}")
 
 
 @lru_cache(maxsize=1)
-def _read(path: str, changed: int, ignore: tuple[str, ...]) -> DeckModel:
+def _read(path: str, changed: int, chosen: _Chosen) -> DeckModel:
     del changed  # a file that is written anew is read anew
     from enumsol.fem.deck_scenes import read_deck  # numpy and scikit-fem: not for --help
 
-    model = read_deck(path, ignore=ignore)
+    model = read_deck(path, ignore=chosen.ignore, assemble=chosen.assemble)
     if not is_quiet():
         say(str(model), err=True)
     return model

@@ -1,7 +1,7 @@
 """Results on stdout and in files: texts, JSON, figures.
 
 What cannot be written after a search is an OutputError, and keeps no other result from being written; what is wrong
-with the name of a file is said before (`enumsol.cli.files`).
+with the name of a file is said before (`enumsol.cli.options`).
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ from typing import TYPE_CHECKING, Any
 import typer
 
 from enumsol.cli.decks import options_said
-from enumsol.cli.streams import is_quiet, pour, say
+from enumsol.cli.progress import is_quiet, pour, say
 from enumsol.errors import InvalidArgumentError, MissingDependencyError, OutputError
 from enumsol.support.files import write_file
 

@@ -6,9 +6,11 @@ import json
 import math
 import shlex
 from dataclasses import dataclass
+from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal, NoReturn
 
 from enumsol.cli import common, options, output
+from enumsol.cli.decks import deck_named, is_deck, step_chosen
 from enumsol.cli.output import plain, taken
 from enumsol.cli.progress import search_display
 from enumsol.errors import InvalidArgumentError
@@ -40,6 +42,7 @@ class Search:
     proof_file : Write the proof (verified).
     resume : Resume from the proof in --proof FILE, if there is one.
     csv_file : Write a table with one row per root and contact node; - is stdout.
+    start_file : Write a deck for every root, FILE-0.inp, ..., which leads CalculiX from an .inp PROBLEM to it.
     report_file : Write an HTML page about the roots, with their deformed bodies.
     """
 
@@ -57,6 +60,7 @@ class Search:
     csv_file: options.OutputFile | None = None
     vtu_file: options.OutputFile | None = None
     frd_file: options.OutputFile | None = None
+    start_file: options.OutputFile | None = None
     report_file: options.OutputFile | None = None
     units: options.Units | None = None
 
@@ -92,12 +96,15 @@ class Search:
         """
         output.check_places(self.vtu_file, problem, name)
         output.check_mesh(self.frd_file, problem, name)
+        if self.start_file is not None and not is_deck(name):
+            raise InvalidArgumentError(f"--start is given, but {name} is no deck; expected an .inp PROBLEM")
         output.check_scripts(self.report_file, problem)
         units = common.units_of(name, self.units)
         found, ended = common.so_far(lambda: self._found(problem, alpha))
         output.deliver(
             (self.vtu_file, lambda path: _write_states(problem, found, path, "--vtu")),
             (self.frd_file, lambda path: _write_states(problem, found, path, "--frd")),
+            (self.start_file, lambda path: _write_starts(name, found, path)),
             (self.report_file, lambda path: self._write_page(found, path, name, source, scene)),
             json_file=self.json_file,
             csv_file=self.csv_file,
@@ -173,6 +180,15 @@ def _write_states(problem: AnyProblem, found: RootSet, path: str, option: str) -
     from enumsol.io import calculix, vtu  # numpy: not for --help
 
     (vtu.write_vtu if option == "--vtu" else calculix.write_frd)(problem, found, path)
+
+
+def _write_starts(name: str, found: RootSet, path: str) -> None:
+    from enumsol.io.deck_starts import write_start  # numpy: not for --help
+
+    model = deck_named(name)
+    place = Path(path)
+    for k, root in enumerate(found):
+        write_start(model, root, place.with_stem(f"{place.stem}-{k}"), step=step_chosen())
 
 
 def _status(found: RootSet) -> common.ExitStatus:

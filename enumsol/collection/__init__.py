@@ -6,9 +6,8 @@ answers are spurious; `export` writes everything to a folder. docs/collection.md
 `check` reads.
 """
 
-from enumsol.collection.comparison import check
+from enumsol.collection.comparison import CollectionReport, JudgedSolution, ProblemReport, check
 from enumsol.collection.entries import COLLECTION, CertifiedSolutions, CollectionEntry, export, get
-from enumsol.collection.reports import CollectionReport, JudgedSolution, ProblemReport
 
 __all__ = [
     "COLLECTION",

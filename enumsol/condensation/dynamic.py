@@ -47,13 +47,15 @@ class Pencil:
         """Factors of A + mu M."""
         return Factorization(self.A)
 
-    def compliance(self, rounding: Floats | None = None) -> Ball:
+    def compliance(self, rounding: Floats | None = None, *, refined: bool = False) -> Ball:
         """B (A + E)^-1 B' for all symmetric E with |E| x <= ``rounding`` for x = 1, entry by entry.
 
         Parameters
         ----------
         rounding : (n, n) sparse matrix, optional
             Bounds of the entries of E.
+        refined : bool
+            With an error of second order in the residual: of an A that is exact and badly conditioned.
 
         Raises
         ------
@@ -62,7 +64,7 @@ class Pencil:
         """
         try:
             itself: Any = self  # as much of a problem as condensing asks for
-            products = Products.of(itself)
+            products = Products.of(itself, refined=refined)
             enclosed = CondensedEnclosure.from_problem(itself, products)
         except InvalidProblemError as error:
             raise NotEnclosedError(str(error)) from None
@@ -130,28 +132,24 @@ class DynamicStiffness:
         return sorted(mu for mu, K in self._known.items() if K is not None)
 
     @cached_property
-    def steepest(self) -> Ball | None:
-        """The limit of K(mu) / mu for large mu, (B M^-1 B')^-1; None where it is not enclosed or not there.
+    def yields(self) -> Mask:
+        """Rows that act on some degree of freedom without mass, (m,)."""
+        return np.asarray(abs(self.rows)[:, ~self._massive].sum(axis=1) > 0).ravel()
 
-        Degrees of freedom without mass that contact rows do not touch are left out: they follow the others.
-        """
-        if self._mobility is None or self.rows[:, ~self._massive].nnz:
-            return None
-        try:
-            return self._inverse(self._mobility)
-        except NotEnclosedError:
-            return None
+    @cached_property
+    def steepest(self) -> Ball | None:
+        """The limit of K(mu) / mu for large mu, (B M^-1 B')^-1, zero in rows that yield; None where not enclosed."""
+        return None if self._mobility is None else self._placed(self._mobility, ~self.yields)
 
     @cached_property
     def stiffest(self) -> Ball | None:
-        """The limit of K(mu) where all contact rows act on degrees of freedom without mass; others stand still."""
-        massless = ~self._massive
-        rows = sp.csr_array(self.rows[:, massless])
-        if not self.increases or np.any(np.diff(rows.indptr) == 0):
-            return None
-        part = sp.csc_array(sp.csr_array(self.A)[massless][:, massless])
+        """The limit of K(mu) in rows that yield, the others held, zero in these; None where it is not enclosed."""
+        still, rows = ~self._massive, sp.csr_array(self.rows[self.yields])
+        if not rows.shape[0]:
+            return Ball.exact(np.zeros((self.rows.shape[0],) * 2))
+        part = sp.csc_array(sp.csr_array(self.A)[still][:, still])
         try:
-            return self._inverse(Pencil(part, rows).compliance())
+            return self._placed(Pencil(part, sp.csr_array(rows[:, still])).compliance(refined=True), self.yields)
         except NotEnclosedError:
             return None
 
@@ -167,20 +165,30 @@ class DynamicStiffness:
 
     @cached_property
     def _mobility(self) -> Ball | None:
-        """B M^-1 B', or an entry of it where rows act on degrees of freedom without mass; None: M is not definite."""
+        """B M^-1 B' of rows that do not yield, or of any if all do; None: M is not definite where it is not zero."""
         massive = self._massive
         if not np.any(massive) or sp.csr_array(self.M)[~massive].nnz:
             return None
-        rows = self.rows[:1] if self.rows[:, ~massive].nnz else self.rows
+        rows = self.rows[:1] if np.all(self.yields) else self.rows[~self.yields]
         part = sp.csc_array(sp.csr_array(self.M)[massive][:, massive])
         try:
             return Pencil(part, sp.csr_array(rows[:, massive])).compliance()
         except NotEnclosedError:
             return None
 
+    def _placed(self, S: Ball, rows: Mask) -> Ball | None:
+        """S^-1 of some rows, zero in the others; None where it is not enclosed."""
+        whole, own = Ball.exact(np.zeros((len(rows),) * 2)), np.ix_(rows, rows)
+        if np.any(rows):
+            try:
+                whole[own] = self._inverse(S)
+            except NotEnclosedError:
+                return None
+        return whole
+
     def _compliance(self, mu: float) -> Ball:
         if mu == 0:
-            return Pencil(self.A, self.rows).compliance() if self._rest is None else self._rest
+            return Pencil(self.A, self.rows).compliance(refined=True) if self._rest is None else self._rest
         added = mu * self.M
         rounding = (abs(self.A) + 2.0 * abs(added)) * (2.0 * UNIT)
         return Pencil(sp.csc_array(self.A + added), self.rows).compliance(rounding)
@@ -198,7 +206,7 @@ class DynamicStiffness:
         rows = sp.csr_array(sp.vstack([self.rows, sp.csr_array(load[None, :])]))
         try:
             if self.held:
-                return K @ Pencil(self.A, rows).compliance()[:m, m]
+                return K @ Pencil(self.A, rows).compliance(refined=True)[:m, m]
             _, share, inverse = self._on_springs
             h = _moved(sp.csr_array(load[None, :]), self._modes)
             balance = inverse.solve(Ball(h.mid.T, h.rad.T))

@@ -25,7 +25,7 @@ from enumsol.arithmetic.balls import (
     upper_norm,
 )
 from enumsol.condensation.data import ProblemData, exactly_at
-from enumsol.condensation.products import Products, scaled
+from enumsol.condensation.products import Products, product, scaled
 from enumsol.errors import EnumsolError
 from enumsol.support.arguments import alpha_value
 from enumsol.support.array_types import AlphaLike, Floats, Mask
@@ -279,7 +279,7 @@ def _smallest_eigenvalue(problem: ProblemData, scale: Floats) -> float:
 
 def moved_by_modes(problem: ProblemData) -> Ball:
     """B N, by what each rigid mode moves the contact nodes, (2p, r) or (3p, r)."""
-    return _product(problem.contact_rows, problem.modes.N)
+    return product(problem.contact_rows, problem.modes.N)
 
 
 _RIGID_OVERFLOW = "the rows of the rigid modes overflow float64; expected data in other units"
@@ -288,15 +288,6 @@ _RIGID_OVERFLOW = "the rows of the rigid modes overflow float64; expected data i
 def _in_units(value: Ball, unit: Floats) -> Ball:
     """A ball times powers of two; zeros stay exact."""
     return Ball(value.mid * unit, np.where(value.rad > 0, value.rad * unit + TINY, 0.0))
-
-
-def _product(left: Floats | sp.csr_array, right: Floats) -> Ball:
-    """The product of two matrices, the first of which may be sparse, with the error of its sums; zeros are exact."""
-    mid = np.asarray(left @ right)
-    size = np.asarray(abs(left) @ np.abs(right))
-    terms = int(np.max(np.diff(sp.csr_array(left).indptr))) if sp.issparse(left) else left.shape[1]
-    k = gamma(terms + 2)
-    return Ball(mid, np.where(size > 0, size * k * (1 + 2 * k) * SAFE + TINY, 0.0))
 
 
 @dataclass(frozen=True)
@@ -366,7 +357,7 @@ class RigidRows:
             rows = Ball(G.mid * pair, np.where(G.rad > 0, G.rad * pair + TINY, 0.0))
             work = float(force[0] * length[0])
             given = [part for part in (problem.f, problem.load_slope) if part is not None]
-            loads = [_in_units(_product(problem.modes.N.T, part[:, None])[:, 0], unit / work) for part in given]
+            loads = [_in_units(product(problem.modes.N.T, part[:, None])[:, 0], unit / work) for part in given]
             most = problem.modes.reach(problem.rigid_reach)
             reach = most / unit
         finite = rows.finite and all(load.finite for load in loads) and np.all(np.isfinite(reach))

@@ -7,14 +7,11 @@ from dataclasses import dataclass, replace
 import numpy as np
 import scipy.sparse as sp
 
-from enumsol.arithmetic.balls import SAFE, TINY, UNIT, SlicedMatrix, gamma, upper_norm
+from enumsol.arithmetic.balls import SAFE, TINY, UNIT, Ball, SlicedMatrix, gamma, upper_norm
 from enumsol.condensation.data import ProblemData
 from enumsol.support.array_types import Floats, Mask
 from enumsol.support.deadlines import look, tell
 from enumsol.support.immutable import Sealed
-
-#: Columns that are made dense together.
-_COLUMNS = 16
 
 
 @dataclass(frozen=True)
@@ -55,9 +52,9 @@ class Products(Sealed):
     bounded: bool
 
     @classmethod
-    def of(cls, problem: ProblemData) -> Products:
-        """Products of a problem."""
-        return cls._of(problem, problem.contact_rows.shape[0])
+    def of(cls, problem: ProblemData, *, refined: bool = True) -> Products:
+        """Products of a problem; if they are not refined, Y = 0, and the error is of first order in the residual."""
+        return cls._of(problem, problem.contact_rows.shape[0], refined=refined)
 
     def with_loads_of(self, problem: ProblemData) -> Products:
         """Products for another load on the same matrices: only the columns of the load are solved for."""
@@ -69,7 +66,7 @@ class Products(Sealed):
         return replace(loads, **columns, bounded=self.bounded and loads.bounded)
 
     @classmethod
-    def _of(cls, problem: ProblemData, columns: int) -> Products:
+    def _of(cls, problem: ProblemData, columns: int, *, refined: bool = True) -> Products:
         """Products with the first columns of B' and with the loads."""
         with np.errstate(over="ignore", invalid="ignore", divide="ignore"):
             # np.ldexp, and not a power function, gives powers of two by definition
@@ -91,19 +88,25 @@ class Products(Sealed):
                 return np.asarray(problem.factorization.solve(columns / scale[:, None], refined=False) / scale[:, None])
 
             k = gamma(int(np.max(np.diff(B.indptr))) + 1)
-            B_size, sliced = abs(B), SlicedMatrix(A)
+            B_size, sliced = abs(B), SlicedMatrix(A) if refined else None
             mid, rounded = np.empty((B.shape[0], K.shape[1])), np.empty((B.shape[0], K.shape[1]))
             lengths, left = np.empty(K.shape[1]), np.empty(K.shape[1])
-            for start in range(0, K.shape[1], _COLUMNS):
+            width = problem.factorization.columns
+            for start in range(0, K.shape[1], width):
                 look()
                 tell("columns of A^-1 B'", start, K.shape[1])
-                part = slice(start, min(start + _COLUMNS, K.shape[1]))
+                part = slice(start, min(start + width, K.shape[1]))
                 given = K[:, part].toarray()
                 X = solve(given)
-                R, R_rad = sliced.residual(X, given)
-                Y = solve(R)
+                if sliced is None:
+                    image, Y = product(A, X), np.zeros_like(X)
+                    rest = given - image.mid
+                    R_rad, rest_rad = image.rad, 2 * UNIT * np.abs(rest)
+                else:
+                    R, R_rad = sliced.residual(X, given)
+                    Y = solve(R)
+                    rest, rest_rad = sliced.residual(Y, R)
                 mid[:, part] = B @ X + B @ Y
-                rest, rest_rad = sliced.residual(Y, R)
                 left[part] = upper_norm((np.abs(rest) + rest_rad + R_rad) * SAFE, axis=0) * SAFE
                 sizes = np.abs(X) + np.abs(Y)
                 rounded[:, part] = (k * (B_size @ sizes) * (1 + 2 * k) + 2 * UNIT * np.abs(mid[:, part])) * SAFE
@@ -125,3 +128,12 @@ def scaled(matrix: sp.csr_array, left: Floats, right: Floats) -> tuple[sp.csr_ar
     data = matrix.data * factor
     exact = bool(np.all(np.isfinite(data))) and np.array_equal(data / factor, matrix.data)
     return sp.csr_array((data, matrix.indices, matrix.indptr), shape=matrix.shape), exact
+
+
+def product(left: Floats | sp.csr_array, right: Floats) -> Ball:
+    """The product of two matrices, the first of which may be sparse, with the error of its sums; zeros are exact."""
+    mid = np.asarray(left @ right)
+    size = np.asarray(abs(left) @ np.abs(right))
+    terms = int(np.max(np.diff(sp.csr_array(left).indptr))) if sp.issparse(left) else left.shape[1]
+    k = gamma(terms + 2)
+    return Ball(mid, np.where(size > 0, size * k * (1 + 2 * k) * SAFE + TINY, 0.0))

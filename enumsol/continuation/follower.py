@@ -8,20 +8,22 @@ from typing import TYPE_CHECKING, Generic, TypeVar
 
 import numpy as np
 
-from enumsol.continuation.corrector import Correction, moore_penrose, smooth_newton
 from enumsol.continuation.path_data import PathData, PathStatus, PointKind
 from enumsol.continuation.recorder import SAME_POINT, Landmarks, PathRecorder, points_of
 from enumsol.continuation.scaled_equation import STATUS_TOLERANCE
 from enumsol.continuation.tangents import RATE_TOLERANCE, Tangent, curve_tangent, orientation
 from enumsol.continuation.transitions import (
     FORWARD_TOLERANCE,
+    Correction,
     Kink,
     TangentPoint,
     confirm,
     continuations,
+    moore_penrose,
     next_kink,
     passed_kink,
     same_curve,
+    smooth_newton,
     turning_point,
 )
 from enumsol.errors import InvalidArgumentError, TooLargeError

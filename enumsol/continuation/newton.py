@@ -8,13 +8,11 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from enumsol.condensation.condensed import condensation_of, solved
-from enumsol.continuation.condensed_equation import CondensedEquation
-from enumsol.continuation.disc_equation import DiscEquation
+from enumsol.continuation.condensed_equation import CondensedEquation, DiscEquation
 from enumsol.continuation.start import check_problem, equation_on
 from enumsol.errors import EnumsolError, InvalidArgumentError
 from enumsol.model.statuses import OPEN, SLIP, STICK
-from enumsol.roots.linearisation import SelectionTangent
-from enumsol.roots.local_branch import SINGULAR_TOLERANCE
+from enumsol.roots.local_branch import SINGULAR_TOLERANCE, SelectionTangent
 from enumsol.roots.root import Root
 from enumsol.support.arguments import alpha_value, positive_integer, positive_number
 from enumsol.support.array_arguments import real_array

@@ -7,9 +7,17 @@ from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
 
-from enumsol.continuation.continuation_options import ContinuationOptions
 from enumsol.continuation.follower import Follower
-from enumsol.continuation.path_data import ARRAYS, RIGID, PathData, PathStats, PathStatus, PointKind, Transition
+from enumsol.continuation.path_data import (
+    ARRAYS,
+    RIGID,
+    ContinuationOptions,
+    PathData,
+    PathStats,
+    PathStatus,
+    PointKind,
+    Transition,
+)
 from enumsol.continuation.start import Start
 from enumsol.continuation.tangents import Tangent, admissible_tangents, curve_tangent
 from enumsol.continuation.transitions import ACTIVE_TOLERANCE, TangentPoint

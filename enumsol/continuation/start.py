@@ -7,11 +7,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from enumsol.continuation.condensed_equation import CondensedEquation
-from enumsol.continuation.continuation_options import ContinuationOptions
-from enumsol.continuation.disc_equation import DiscEquation
+from enumsol.continuation.condensed_equation import CondensedEquation, DiscEquation
 from enumsol.continuation.parameter_path import ParameterPath, SmoothPath
-from enumsol.continuation.path_data import PathData
+from enumsol.continuation.path_data import ContinuationOptions, PathData
 from enumsol.errors import InvalidArgumentError
 from enumsol.model.problem import ContactProblem, check_is_problem
 from enumsol.support.arguments import alpha_value, instance_of, unbounded_interval

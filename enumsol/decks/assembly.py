@@ -8,8 +8,9 @@ import numpy as np
 
 from enumsol.decks.cards import DeckPlace, key, shown
 from enumsol.decks.faces import named_faces
-from enumsol.decks.model import Account, Deck, DeckRegion, Members, Surface
+from enumsol.decks.model import Account, Deck, DeckRegion, Members, RigidProfile, Surface
 from enumsol.decks.registry import Reading
+from enumsol.decks.rigid import add_layers, add_profiles
 from enumsol.errors import InvalidArgumentError
 from enumsol.support.array_types import Floats, Integers, Mask
 from enumsol.support.messages import counted, listed
@@ -46,6 +47,9 @@ def put_together(reading: Reading) -> Deck:
             (deck.node_sets if kind == "NSET" else deck.element_sets)[name] = rows
         before = f"{reading.instances[instance].spelled}." if instance else ""
         deck.spelled.setdefault(name, before + members.spelled)
+    if not reading.bare:
+        add_profiles(deck, whole.profiles)
+        add_layers(deck)
     empty = {name for name, rows in deck.element_sets.items() if not len(rows)}
     for section in deck.sections:
         if section.elements in empty:
@@ -92,6 +96,7 @@ class _Whole:
         self.numbers: dict[tuple[str, str], _Numbers] = {}
         self.sets: dict[tuple[str, str], tuple[Members, str]] = {}
         self.known: dict[tuple[str, str], Integers] = {}
+        self.profiles: dict[str, RigidProfile] = {}
         self.nodes = self.elements = 0
 
     def add(self, instance: str, region: DeckRegion) -> None:
@@ -119,6 +124,12 @@ class _Whole:
             before + name: replace(own, points=region.moved(own.points), origin=region.moved(own.origin[None])[0])
             for name, own in region.orientations.items()
         }
+        self.profiles |= {before + name: own.moved(region) for name, own in region.profiles.items()}
+        for coupling in region.couplings:
+            target, reference = before + coupling.target, before + coupling.reference
+            rotation = before + coupling.rotation if coupling.rotation else None
+            moved = replace(coupling, target=target, reference=reference, rotation=rotation)
+            self.deck.analysis.couplings.append(moved)
         for section in region.sections:
             turned = before + section.orientation if section.orientation else ""
             self.deck.sections.append(replace(section, elements=before + section.elements, orientation=turned))

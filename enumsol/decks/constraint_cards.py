@@ -61,14 +61,13 @@ def mpc(reading: Reading, given: Card) -> str:
 @card("RIGID BODY", "NSET", "ELSET", "TIE NSET", "PIN NSET", "REF NODE", "ROT NODE", "ANALYTICAL SURFACE")
 def rigid_body(reading: Reading, given: Card) -> str:
     """*RIGID BODY: nodes or elements that move as one."""
-    if "ANALYTICAL SURFACE" in given.options:
-        raise given.refused("has an ANALYTICAL SURFACE; expected a rigid body of elements, as nodes face their facets")
-    target = next((name for option in ("NSET", "ELSET", "TIE NSET", "PIN NSET") if (name := given.name_of(option))), "")
+    kinds = ("NSET", "ELSET", "TIE NSET", "PIN NSET", "ANALYTICAL SURFACE")
+    target = next((name for option in kinds if (name := given.name_of(option))), "")
     if not target:
-        raise given.refused("has no NSET or ELSET; expected one")
+        raise given.refused("has no NSET, ELSET or ANALYTICAL SURFACE; expected one")
     reference = given.needed("REF NODE")
     rotation = given.name_of("ROT NODE") or None
-    reading.analysis.couplings.append(Coupling(given.place, given.name, target, reference, rotation))
+    reading.region.couplings.append(Coupling(given.place, given.name, target, reference, rotation))
     return f"{target} moves as a rigid body with node {reference}"
 
 

@@ -40,11 +40,13 @@ def surface_interaction(reading: Reading, given: Card) -> str:
 )
 def surface_behavior(reading: Reading, given: Card) -> str:
     """*SURFACE BEHAVIOR: contact is hard, or what touches stays joined."""
-    own = _interaction(reading, given)
+    own, later = _interaction(reading, given), bool(reading.analysis.steps)
+    if later and not reading.analysis.steps[-1].is_softened:
+        raise given.refused("stands in a step without *CHANGE SURFACE BEHAVIOR before it; expected that")
     if "NO SEPARATION" in given.options:
         raise given.refused("has NO SEPARATION; expected surfaces that may part")
     kind = given.name_of("PRESSURE-OVERCLOSURE") or "HARD"
-    if kind == "TIED":
+    if kind == "TIED" and not later:
         own.tied = True
         return "surfaces that stay joined"
     if kind == "HARD":
@@ -88,7 +90,10 @@ def contact_pair(reading: Reading, given: Card) -> str:
     """*CONTACT PAIR: the first surface has the contact nodes, the second one the facets that they face."""
     if reading.analysis.steps:
         raise given.refused("stands in a step; expected contacts before the first *STEP")
-    distance = _length(given, "ADJUST", "the distance up to which nodes are moved")
+    chosen = given.name_of("ADJUST")
+    distance: float | str | None = chosen
+    if not chosen[:1].isalpha():
+        distance = _length(given, "ADJUST", "the distance up to which nodes are moved, or the set of these nodes")
     name = given.name_of("INTERACTION")
     for row, entries in given.rows():
         slave, master = _two(given, row, entries)
@@ -97,8 +102,48 @@ def contact_pair(reading: Reading, given: Card) -> str:
         )
     said = ["nodes of the first surface against facets of the second, with small sliding"]
     if distance is not None:
-        said.append(f"gaps up to {distance:g} are closed")
+        said.append(f"gaps {f'of {distance}' if isinstance(distance, str) else f'up to {distance:g}'} are closed")
     return "; ".join(said)
+
+
+@card("CONTACT", unused=("OP",))
+def contact(reading: Reading, given: Card) -> str:
+    """*CONTACT: the cards after it name the surfaces that may touch; without friction unless one says so."""
+    if reading.analysis.steps:
+        raise given.refused("stands in a step; expected contacts before the first *STEP")
+    reading.analysis.interactions.setdefault("", Interaction(given.place))
+    return "contacts of the pairs that cards after it name"
+
+
+@card("CONTACT INCLUSIONS", "ALL EXTERIOR")
+def contact_inclusions(reading: Reading, given: Card) -> str:
+    """*CONTACT INCLUSIONS: pairs of surfaces; overlaps of the geometry are taken away first, as Abaqus does."""
+    if "ALL EXTERIOR" in given.options or not given.data:
+        raise given.refused("has ALL EXTERIOR; expected the surfaces that may touch, two in a line, as in 'UNDER, ON'")
+    for row, entries in given.rows():
+        slave, master = [*map(key, entries), "", ""][:2]
+        if "" not in reading.analysis.interactions or not slave or not master or slave == master:
+            raise given.refused(f"has {slave}:{master}; expected two named surfaces behind *CONTACT", row)
+        reading.analysis.pairs.append(ContactPair(given.at(row), slave, master, "", 0.0, is_included=True))
+    return "nodes of the first surface against facets of the second, with small sliding; overlaps are taken away"
+
+
+@card("CONTACT PROPERTY ASSIGNMENT")
+def contact_property_assignment(reading: Reading, given: Card) -> str:
+    """*CONTACT PROPERTY ASSIGNMENT: the interaction of pairs of *CONTACT INCLUSIONS, of all or of one."""
+    pairs = reading.analysis.pairs
+    for row, entries in given.rows():
+        one, two, name = [*map(key, entries), "", "", ""][:3]
+        own = [
+            k for k, pair in enumerate(pairs) if pair.is_included and {one, two} in ({""}, {pair.slave, pair.master})
+        ]
+        if not own or not name:
+            raise given.refused(
+                f"gives {name or 'nothing'} to {one}:{two}; expected a pair of *CONTACT INCLUSIONS", row
+            )
+        for k in own:
+            pairs[k] = replace(pairs[k], interaction=name)
+    return "contact properties of these pairs"
 
 
 @card("CLEARANCE", "SLAVE", "MASTER", "VALUE", unused=("CPSET",))
@@ -108,12 +153,45 @@ def clearance(reading: Reading, given: Card) -> str:
     value = _length(given, "VALUE", "a distance")
     if value is None:
         raise given.refused("has no VALUE; expected a distance")
-    for k, pair in enumerate(reading.analysis.pairs):
-        if (pair.slave, pair.master) == (slave, master):
-            reading.analysis.pairs[k] = replace(pair, clearance=value)
-            return f"gap {value:g} of the pair {slave}:{master}"
+    pair = pair_named(reading, given, (slave, master))
+    reading.analysis.pairs[reading.analysis.pairs.index(pair)] = replace(pair, clearance=value)
+    return f"gap {value:g} of the pair {slave}:{master}"
+
+
+@card("CHANGE SURFACE BEHAVIOR", "INTERACTION")
+def change_surface_behavior(reading: Reading, given: Card) -> str:
+    """*CHANGE SURFACE BEHAVIOR: the *SURFACE BEHAVIOR after it is that of an interaction from this step on."""
+    name = given.needed("INTERACTION")
+    if name not in reading.analysis.interactions or not reading.analysis.steps:
+        known = ", ".join(reading.analysis.interactions) or "none"
+        raise given.refused(f"names the interaction {name}; expected one of {known}, in a step")
+    reading.analysis.changing, reading.analysis.steps[-1].is_softened = name, True
+    return f"surfaces of {name} have another behavior"
+
+
+@card("CONTACT INTERFERENCE", "SHRINK", "TYPE", "OP")
+def contact_interference(reading: Reading, given: Card) -> str:
+    """*CONTACT INTERFERENCE: how an overlap of the geometry is taken up within a step, at the end of which it is."""
+    if given.name_of("TYPE") not in ("", "CONTACT PAIR"):
+        raise given.refused(f"has TYPE={given.name_of('TYPE')}; expected contact pairs")
+    for row, entries in given.rows():
+        pair_named(reading, given, tuple(map(key, entries[:2])), row)
+    return "overlaps are taken up in full at the end of the step, as they are without this card"
+
+
+def pair_named(reading: Reading, given: Card, surfaces: tuple[str, ...], row: int | None = None) -> ContactPair:
+    """Pair of contact of two surfaces, which was given before.
+
+    Raises
+    ------
+    InvalidArgumentError
+        There is none.
+    """
+    for pair in reading.analysis.pairs:
+        if (pair.slave, pair.master) == surfaces:
+            return pair
     known = ", ".join(f"{pair.slave}:{pair.master}" for pair in reading.analysis.pairs) or "none"
-    raise given.refused(f"names the pair {slave}:{master}; expected one that was given before: {known}")
+    raise given.refused(f"names the pair {':'.join(surfaces)}; expected one that was given before: {known}", row)
 
 
 @card(

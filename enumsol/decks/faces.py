@@ -16,7 +16,7 @@ _NO_FACES = np.zeros((0, 2), dtype=np.int64)
 
 
 def named_faces(deck: Deck, elements: Integers, label: str, place: DeckPlace) -> Integers:
-    """Faces (k, 2) of elements: their rows and the numbers of their faces from 0, or -1 for the element itself.
+    """Faces (k, 2) of elements: their rows and the numbers of their faces from 0, or as in `Surface`.
 
     Parameters
     ----------
@@ -45,7 +45,7 @@ def named_faces(deck: Deck, elements: Integers, label: str, place: DeckPlace) ->
             found.append(free[np.isin(free[:, 0], own)])
             continue
         if not faces and block.type.shape.dimension and label in ("", "SPOS", "SNEG", "S1", "S2"):
-            number = -1
+            number = -2 if label == "SNEG" else -1
         elif label[:1] == "S" and label[1:].isdecimal() and 1 <= int(label[1:]) <= len(faces):
             number = int(label[1:]) - 1
         else:
@@ -104,6 +104,21 @@ def free_faces(deck: Deck) -> Integers:
     whole = np.sum(every >= 0, axis=1) >= max(deck.dimension, 2)
     _, rows, count = np.unique(every[whole], axis=0, return_index=True, return_counts=True)
     return np.asarray(of[whole][np.sort(rows[count == 1])])
+
+
+def faces_of_nodes(deck: Deck, nodes: Integers) -> Integers:
+    """Faces (k, 2) of bodies that belong to one element only and all of whose corners are among some nodes."""
+    free, given = free_faces(deck), np.zeros(len(deck.points), dtype=bool)
+    given[nodes] = True
+    first, found = 0, [_NO_FACES]
+    for block in deck.blocks:
+        own = free[(free[:, 0] >= first) & (free[:, 0] < first + len(block.labels))]
+        for number in np.unique(own[:, 1]).tolist():
+            faces = own[own[:, 1] == number]
+            corners = [node for node in block.type.shape.faces[number] if node < block.type.shape.corners]
+            found.append(faces[np.all(given[block.nodes[faces[:, 0] - first][:, corners]], axis=1)])
+        first += len(block.labels)
+    return np.concatenate(found)
 
 
 def _turns(form: str) -> list[list[int]]:

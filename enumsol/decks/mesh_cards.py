@@ -8,8 +8,8 @@ import numpy as np
 
 from enumsol.decks.cards import Card, is_number
 from enumsol.decks.elements import element_type
-from enumsol.decks.model import DeckRegion, ElementBlock, Members
-from enumsol.decks.registry import Reading, card, harmless
+from enumsol.decks.model import DeckRegion, ElementBlock, Members, RigidProfile
+from enumsol.decks.registry import Reading, card, harmless, refused
 from enumsol.support.messages import counted
 
 harmless("it asks for output", *(
@@ -18,16 +18,8 @@ harmless("it asks for output", *(
     "ENERGY PRINT", "ENERGY OUTPUT", "PRINT", "FILE OUTPUT", "INTEGRATED OUTPUT", "DIAGNOSTICS", "FACE PRINT",
 ))  # fmt: skip
 mesh_card = partial(card, of_mesh=True)
-#: Cards that make or move nodes or elements.
-_MAKERS = ("NGEN", "NFILL", "NCOPY", "NMAP", "ELGEN", "ELCOPY", "SYSTEM")
-
-
-def _refused_maker(reading: Reading, given: Card) -> str | None:
-    raise given.refused("makes or moves nodes or elements, which is not read; expected all of them written out")
-
-
-for _name in _MAKERS:
-    mesh_card(_name, *("NSET", "LINE", "NEW SET", "OLD SET", "CHANGE NUMBER", "ELSET", "SHIFT"))(_refused_maker)
+refused("makes or moves nodes, which are to be written out", "to leave all nodes where they are", "NMAP", "SYSTEM",
+        of_mesh=True)  # fmt: skip
 
 
 @mesh_card("HEADING", "UNSYMMETRIC AXISYMMETRIC", "SPARSE")
@@ -79,7 +71,7 @@ def element(reading: Reading, given: Card) -> str | None:
     return f"{counted(len(values), 'element')} of type {name}"
 
 
-@mesh_card("NSET", "NSET", "GENERATE", "INSTANCE", "INTERNAL", "UNSORTED", "ELSET")
+@mesh_card("NSET", "NSET", "GENERATE", "INSTANCE", "INTERNAL", "UNSORTED", "ELSET", unused=("FREQUENCY",))
 def nset(reading: Reading, given: Card) -> str:
     """*NSET: a set of nodes, or more nodes for one that exists."""
     members = _set(reading, given, "NSET")
@@ -130,8 +122,13 @@ def surface(reading: Reading, given: Card) -> str:
     """*SURFACE: faces of elements, or nodes."""
     given.needed("NAME")
     kind = given.name_of("TYPE") or "ELEMENT"
+    if kind in ("SEGMENTS", "CYLINDER"):
+        reading.region.profiles[given.needed("NAME")] = _profile(given, kind == "CYLINDER")
+        return f"rigid surface of lines {given.needed('NAME')}"
     if kind not in ("ELEMENT", "NODE"):
-        raise given.refused(f"is of type {kind}, which is not read; expected TYPE=ELEMENT or TYPE=NODE")
+        raise given.refused(
+            f"is of type {kind}, which is not read; expected ELEMENT or NODE, or SEGMENTS or CYLINDER of straight lines"
+        )
     members = reading.region.members("SURFACE", given.options["NAME"], given.place)
     members.nodal = kind == "NODE"
     numbers: dict[str, tuple[int, list[int]]] = {}
@@ -146,6 +143,33 @@ def surface(reading: Reading, given: Card) -> str:
     for label, (row, every) in numbers.items():
         members.parts.append((label, np.array(every, dtype=np.int64), "", given.at(row)))
     return f"surface of {'nodes' if members.nodal else 'faces'} {members.spelled}"
+
+
+def _profile(given: Card, swept: bool) -> RigidProfile:
+    """Lines of a rigid surface, behind the axes of those that are swept: an origin, a point on x, and one on -z."""
+    origin, axes, rows = np.zeros(3), np.eye(3), [*given.rows()]
+    if swept and rows and not rows[0][1][0][:1].isalpha():
+        values = np.array([*given.numbers(0, 6, 6), *given.numbers(1, 3, 3)]).reshape(3, 3)
+        origin, (along, across) = values[0], values[1:] - values[0]
+        third = np.cross(np.cross(along, -across), along)
+        if not np.any(third):
+            raise given.refused("has three points in line; expected an origin, a point on x and one across", 0)
+        axes = np.array([own / np.linalg.norm(own) for own in (along, np.cross(third, along), third)])
+        rows = rows[2:]
+    corners = []
+    for k, (row, entries) in enumerate(rows):
+        word, expected = "".join(entries[:1]).upper(), "LINE" if k else "START"
+        if word != expected or len(entries) != 3:
+            raise given.refused(
+                f"has {word or 'nothing'} with {counted(max(len(entries) - 1, 0), 'number')}; expected {expected} with "
+                "two, as curves are not read (rigid elements are)", row
+            )  # fmt: skip
+        corners.append([given.number(entry, row) for entry in entries[1:]])
+        if len(corners) > 1 and corners[-1] == corners[-2]:
+            raise given.refused("has a line of no length; expected another point", row)
+    if len(corners) < 2:
+        raise given.refused("has no line; expected START and LINE")
+    return RigidProfile(given.place, np.array(corners), origin, axes, swept)
 
 
 def _check_outside(reading: Reading, given: Card) -> None:

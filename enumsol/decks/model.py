@@ -15,7 +15,7 @@ import numpy as np
 
 from enumsol.decks.cards import DeckPlace, is_number, key, shown
 from enumsol.decks.elements import ElementType
-from enumsol.decks.steps import Analysis
+from enumsol.decks.steps import Analysis, Coupling
 from enumsol.errors import InvalidArgumentError
 from enumsol.support.array_types import Floats, Integers
 from enumsol.support.messages import listed
@@ -165,6 +165,37 @@ class Material:
     expansion_place: DeckPlace | None = None
 
 
+@dataclass(frozen=True, eq=False)
+class RigidProfile:
+    """A rigid surface that is given by lines of the plane, in 3D swept across it; what touches it is to their left.
+
+    Attributes
+    ----------
+    place : DeckPlace
+    corners : (k, 2) array
+        Ends of its lines in local coordinates.
+    origin : (3,) array
+    axes : (3, 3) array
+        Directions of the local axes.
+    is_swept : bool
+    """
+
+    place: DeckPlace
+    corners: Floats
+    origin: Floats
+    axes: Floats
+    is_swept: bool
+
+    def at(self, height: float) -> Floats:
+        """Positions (k, 3) of the corners at a height across their plane."""
+        return np.asarray(self.origin + self.corners @ self.axes[:2] + height * self.axes[2])
+
+    def moved(self, region: DeckRegion) -> RigidProfile:
+        """The profile where an instance has it."""
+        origin, *ends = region.moved(np.concatenate([self.origin[None], self.origin + self.axes]))
+        return replace(self, origin=origin, axes=np.array(ends) - origin)
+
+
 @dataclass(eq=False)
 class DeckRegion:
     """Nodes, elements, sets and surfaces with numbers and names of their own: of the deck itself, or of a part.
@@ -179,6 +210,9 @@ class DeckRegion:
     sets : dict of ("NSET", "ELSET" or "SURFACE", key) to Members
     sections : list of Section
     orientations : dict of keys to Orientation
+    profiles : dict of keys to RigidProfile
+    couplings : list of Coupling
+        Rigid bodies, by names and numbers of the region.
     translation : (3,) array
     rotation : (7,) array or None
         Two points on an axis, and degrees about it, for after the translation.
@@ -193,6 +227,8 @@ class DeckRegion:
     sets: dict[tuple[str, str], Members] = field(default_factory=dict)
     sections: list[Section] = field(default_factory=list)
     orientations: dict[str, Orientation] = field(default_factory=dict)
+    profiles: dict[str, RigidProfile] = field(default_factory=dict)
+    couplings: list[Coupling] = field(default_factory=list)
     translation: Floats = field(default_factory=lambda: np.zeros(3))
     rotation: Floats | None = None
     is_used: bool = False
@@ -204,8 +240,8 @@ class DeckRegion:
     def copied(self, place: DeckPlace, spelled: str) -> DeckRegion:
         """Copy for an instance, which may get more."""
         sets = {name: replace(own, parts=[*own.parts]) for name, own in self.sets.items()}
-        return DeckRegion(place, spelled, [*self.nodes], [*self.blocks], sets, [*self.sections], dict(self.orientations)
-        )  # fmt: skip
+        return DeckRegion(place, spelled, [*self.nodes], [*self.blocks], sets, [*self.sections],
+                          dict(self.orientations), dict(self.profiles), [*self.couplings])  # fmt: skip
 
     def moved(self, points: Floats) -> Floats:
         """Points (k, 3) of the part where its instance has them."""
@@ -229,7 +265,8 @@ class Surface:
     ----------
     place : DeckPlace
     faces : (k, 2) int array
-        Rows of elements, and numbers of their faces from 0; -1 for the element itself, of lower dimension than bodies.
+        Rows of elements, and numbers of their faces from 0; -1 for the element itself, of lower dimension than bodies,
+        and -2 for its other side.
     nodes : (k,) int array or None
         Rows of its nodes, of a surface of nodes.
     """

@@ -71,8 +71,9 @@ class Reading:
             It is not known, or not as expected.
         """
         name = compact(card.name)
-        close = [] if name in CARDS or name in HARMLESS else difflib.get_close_matches(name, CARDS, n=1, cutoff=0.87)
-        if self.bare and not any(CARDS[own].of_mesh for own in (name, *close) if own in CARDS):
+        is_known = any(name in table for table in (CARDS, HARMLESS, REFUSED))
+        close = [] if is_known else difflib.get_close_matches(name, CARDS, n=1, cutoff=0.87)
+        if self.bare and not any(own in OF_MESH for own in (name, *close)):
             return
         if name in self.ignore:
             self.account(card, "not used, as you say", used=False)
@@ -88,9 +89,10 @@ class Reading:
         elif name in HARMLESS:
             self.account(card, f"not used: {HARMLESS[name]}", used=False)
         else:
+            found, without = REFUSED.get(name, ("is not read, and may change the answer", "to do without it"))
             raise card.refused(
-                f"is not read, and may change the answer; expected {f'*{close[0]}' if close else 'other cards'}, or "
-                f'--ignore {card.name.replace(" ", "")} (in Python ignore=["..."]) to do without it'
+                f"{found}; expected {f'*{close[0]}' if close else 'other cards'}, or "
+                f'--ignore {card.name.replace(" ", "")} (in Python ignore=["..."]) {without}'
             )
 
     def account(self, card: Card, became: str, *, used: bool = True) -> None:
@@ -100,18 +102,19 @@ class Reading:
 
 @dataclass(frozen=True)
 class Rule:
-    """A function that reads a card, options that it knows, those that change nothing, and whether it is of the mesh."""
+    """A function that reads a card, options that it knows, and those that change nothing."""
 
     read: Reader
     options: frozenset[str]
     passed: frozenset[str]
-    of_mesh: bool
 
 
 #: Cards that are read, by their names without blanks.
 CARDS: dict[str, Rule] = {}
 #: Cards that change nothing, by their names without blanks, and why.
 HARMLESS: dict[str, str] = {}
+#: Cards that are refused for a reason, by their names without blanks: what they are, and what it means to ignore them.
+REFUSED: dict[str, tuple[str, str]] = {}
 
 
 def card(name: str, *options: str, unused: Collection[str] = (), of_mesh: bool = False) -> Callable[[Reader], Reader]:
@@ -119,7 +122,8 @@ def card(name: str, *options: str, unused: Collection[str] = (), of_mesh: bool =
 
     def entered(read: Reader) -> Reader:
         passed = frozenset(map(compact, unused))
-        CARDS[compact(name)] = Rule(read, passed.union(map(compact, options)), passed, of_mesh)
+        CARDS[compact(name)] = Rule(read, passed.union(map(compact, options)), passed)
+        OF_MESH.update([compact(name)] if of_mesh else ())
         return read
 
     return entered
@@ -128,6 +132,16 @@ def card(name: str, *options: str, unused: Collection[str] = (), of_mesh: bool =
 def harmless(reason: str, *names: str) -> None:
     """Enter cards that change nothing."""
     HARMLESS.update({compact(name): reason for name in names})
+
+
+#: Cards of either kind that a mesh alone depends on.
+OF_MESH: set[str] = set()
+
+
+def refused(found: str, without: str, *names: str, of_mesh: bool = False) -> None:
+    """Enter cards that are refused: what they are, and what leaving them out means."""
+    REFUSED.update({compact(name): (found, without) for name in names})
+    OF_MESH.update(map(compact, names if of_mesh else ()))
 
 
 def compact(name: str) -> str:

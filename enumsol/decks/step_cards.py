@@ -6,7 +6,8 @@ from itertools import pairwise
 from typing import TYPE_CHECKING
 
 from enumsol.decks.cards import is_number, key
-from enumsol.decks.registry import card, harmless
+from enumsol.decks.contact_cards import pair_named
+from enumsol.decks.registry import card, compact, harmless, refused
 from enumsol.decks.steps import Act, Amplitude, DeckStep
 
 if TYPE_CHECKING:
@@ -30,6 +31,12 @@ SUPPORTS = {
 VOLUME = ("BX", "BY", "BZ")
 #: Options of cards of loads and displacements that make them something else.
 _OTHER = ("SUBMODEL", "USER", "MASS FLOW", "BASE NAME", "FIXED", "SECTOR", "FILE", "BSTEP", "TIME DELAY", "LOAD CASE")
+#: Cards of other analyses than static ones.
+_ANALYSES = (
+    "FREQUENCY", "COMPLEX FREQUENCY", "BUCKLE", "DYNAMIC", "MODAL DYNAMIC", "STEADY STATE DYNAMICS", "HEAT TRANSFER",
+    "COUPLED TEMPERATURE-DISPLACEMENT", "UNCOUPLED TEMPERATURE-DISPLACEMENT", "VISCO", "SENSITIVITY", "GREEN",
+    "ELECTROMAGNETICS", "CRACK PROPAGATION", "CFD", "SUBSTRUCTURE GENERATE", "RESPONSE SPECTRUM", "RANDOM RESPONSE",
+)  # fmt: skip
 #: What each kind of act is.
 _WORDS = {"BOUNDARY": "displacements", "CLOAD": "forces", "DLOAD": "loads", "TEMPERATURE": "temperatures"}
 
@@ -38,8 +45,9 @@ harmless("all equilibria at the end of a step are found, without increments", *(
     "CONTROLS", "CONTACT CONTROLS", "SOLVER CONTROLS", "TIME POINTS", "NO ANALYSIS", "ANALYSIS CONTROLS",
 ))  # fmt: skip
 harmless("it asks for output", "FILTER")
-harmless("the analysis is static", "DAMPING", "GLOBAL DAMPING", "MODAL DAMPING")
+harmless("the analysis is static", "DAMPING", "GLOBAL DAMPING", "MODAL DAMPING", "CONTACT DAMPING", "DASHPOT")
 harmless("it is of reduced integration, in place of which elements are integrated in full", "SECTION CONTROLS")
+refused("is another analysis than *STATIC", "to leave out its step as a whole", *_ANALYSES)
 harmless("no heat is conducted", *(
     "CONDUCTIVITY", "SPECIFIC HEAT", "LATENT HEAT", "PHYSICAL CONSTANTS", "GAP CONDUCTANCE", "GAP HEAT GENERATION",
 ))  # fmt: skip
@@ -53,24 +61,29 @@ def step(reading: Reading, given: Card) -> str:
     """*STEP: what follows belongs to a new step."""
     if reading.analysis.steps and not reading.analysis.steps[-1].ended:
         raise given.refused("begins before the step before it has ended; expected *END STEP")
-    if "PERTURBATION" in given.options:
-        raise given.refused("has PERTURBATION, the answer to small changes about a state; expected a static step")
     large = "NLGEOM" in given.options and given.name_of("NLGEOM") != "NO"
     if large and "NLGEOM" not in reading.ignore:
-        raise given.refused("has NLGEOM, large displacements; expected small ones, or NLGEOM among what is ignored")
-    reading.analysis.steps.append(
-        DeckStep(given.place, given.options.get("NAME", "") or f"step {len(reading.analysis.steps) + 1}")
-    )
+        raise given.refused(
+            'has NLGEOM, large displacements; expected small ones, or --ignore NLGEOM (in Python ignore=["NLGEOM"]) to '
+            "take all displacements as small"
+        )
+    own = DeckStep(given.place, given.options.get("NAME", "") or f"step {len(reading.analysis.steps) + 1}")
+    own.about_a_state = "PERTURBATION" in given.options
+    reading.analysis.steps.append(own)
     return f"step {len(reading.analysis.steps)}" + ("; NLGEOM is ignored: displacements are small" if large else "")
 
 
 @card("END STEP")
-def end_step(reading: Reading, given: Card) -> None:
-    """*END STEP: what the step lacks is refused."""
+def end_step(reading: Reading, given: Card) -> str | None:
+    """*END STEP: what the step lacks is refused; a step of an analysis that is left out is left out."""
     own = _step(reading, given)
-    if not own.analysis:
+    if own.analysis:
+        own.ended = True
+        return None
+    if not {compact(name) for name in _ANALYSES} & set(reading.ignore):
         raise given.refused(f"ends step {len(reading.analysis.steps)}, which has no *STATIC; expected a static step")
-    own.ended = True
+    reading.analysis.steps.pop()
+    return f"the step that begins in line {own.place.line if own.place else 0} is left out as a whole, as you say"
 
 
 @card(
@@ -88,6 +101,8 @@ def end_step(reading: Reading, given: Card) -> None:
 def static(reading: Reading, given: Card) -> str:
     """*STATIC: its time counts for amplitudes."""
     own = _step(reading, given)
+    if own.about_a_state:
+        raise given.refused("stands in a step with PERTURBATION, small changes about a state; expected a step without")
     own.analysis = given.name
     for row, entries in given.rows():
         if row == 0 and len(entries) > 1:
@@ -95,6 +110,19 @@ def static(reading: Reading, given: Card) -> str:
         if own.period < 0:
             raise given.refused(f"has the time {own.period:g}; expected a time > 0", row)
     return f"a static step of time {own.period:g}; increments are not used, as all equilibria at its end are sought"
+
+
+@card("MODEL CHANGE", "TYPE", "ADD", "REMOVE")
+def model_change(reading: Reading, given: Card) -> str:
+    """*MODEL CHANGE: pairs that are in contact no more, or again, from this step on."""
+    own = _step(reading, given)
+    if given.name_of("TYPE") != "CONTACT PAIR" or ("ADD" in given.options) == ("REMOVE" in given.options):
+        raise given.refused("changes other things than contacts; expected TYPE=CONTACT PAIR with either ADD or REMOVE")
+    word = "again" if "ADD" in given.options else "no more"
+    for row, entries in given.rows():
+        pair = pair_named(reading, given, tuple(map(key, entries[:2])), row)
+        own.contacts[pair.slave, pair.master] = word == "again"
+    return f"in contact {word}: {_some(':'.join(pair) for pair in own.contacts)}"
 
 
 @card("BOUNDARY", "OP", "AMPLITUDE", "TYPE", *_OTHER)

@@ -84,8 +84,14 @@ class DeckStep:
         Cards of whose acts none of before stays (OP=NEW): BOUNDARY, CLOAD, DLOAD, DSLOAD, TEMPERATURE.
     friction : dict of str to float
         Coefficients that change in this step, by the names of interactions.
+    contacts : dict of (str, str) to bool
+        Pairs that are in contact no more from this step on, or again, by their surfaces.
     analysis : str or None
         The card of its analysis.
+    is_softened : bool
+        Whether a card says that surfaces behave in another way.
+    about_a_state : bool
+        Whether it asks for small changes about the state that is reached (PERTURBATION).
     """
 
     place: DeckPlace | None = None
@@ -94,7 +100,10 @@ class DeckStep:
     acts: list[Act] = field(default_factory=list)
     fresh: set[str] = field(default_factory=set)
     friction: dict[str, float] = field(default_factory=dict)
+    contacts: dict[tuple[str, str], bool] = field(default_factory=dict)
     analysis: str | None = None
+    is_softened: bool = False
+    about_a_state: bool = False
     ended: bool = False
 
 
@@ -124,21 +133,24 @@ class ContactPair:
     ----------
     place : DeckPlace
     slave, master, interaction : str
-    adjust : float or None
-        Distance up to which nodes are moved onto the other surface before the analysis.
+    adjust : float, str or None
+        Distance up to which nodes are moved onto the other surface before the analysis, or the set of these nodes.
     clearance : float or None
         Replaces the distances of the geometry [length].
     tied : bool
         Whether the two stay joined.
+    is_included : bool
+        Whether *CONTACT INCLUSIONS names it, and a later card gives its interaction.
     """
 
     place: DeckPlace
     slave: str
     master: str
     interaction: str
-    adjust: float | None = None
+    adjust: float | str | None = None
     clearance: float | None = None
     tied: bool = False
+    is_included: bool = False
 
 
 @dataclass(frozen=True)

@@ -82,6 +82,26 @@ def completed(points: Floats, parts: Sequence[Integers]) -> tuple[Floats, list[I
     return np.concatenate([points, *(place[None] for place in places)]), found
 
 
+def completing(dimension: int, cells: Integers, count: int) -> list[tuple[Integers, Floats]]:
+    """Nodes from ``count`` on, which complete cells as in `completed`, by those that their cells have without them.
+
+    Returns
+    -------
+    list of (k, 1 + s) int array and (s,) array
+        Each row a node and others, and the values of their shape functions there.
+    """
+    found = []
+    for _, nodes in by_kind(dimension, cells):
+        kind = KINDS[dimension, nodes.shape[1]]
+        around = [(side[8], side[:8], np.repeat([-0.25, 0.5], 4)) for side in kind.sides if len(side) == 9]
+        if nodes.shape[1] == 27:
+            around.append((26, np.arange(20), np.repeat([-0.25, 0.25], [8, 12])))
+        for own, others, shares in around:
+            new = nodes[nodes[:, own] >= count]
+            found.append((np.column_stack([new[:, own], new[:, others]]), shares))
+    return found
+
+
 def _numbers(
     keys: list[list[int]], places: Floats, known: dict[tuple[int, ...], int], new: list[Floats], first: int
 ) -> Integers:

@@ -156,6 +156,29 @@ class Contacts:
     areas: Floats
     groups: list[Group]
 
+    def without(self, nodes: Integers) -> Contacts:
+        """Contacts without some nodes, whose areas go to the others of their group.
+
+        Raises
+        ------
+        InvalidArgumentError
+            No others are left to a group.
+        """
+        kept, areas, groups, first = ~np.isin(self.rows.nodes, nodes), self.areas.copy(), [], 0
+        for group in self.groups:
+            own = slice(first, first := first + group.count)
+            if not np.any(kept[own]):
+                raise InvalidArgumentError(f"contact of {group} has no node that can be in contact; expected some")
+            areas[own] *= np.sum(areas[own]) / np.sum(areas[own][kept[own]])
+            groups.append(replace(group, normals=group.normals[kept[own]], count=int(np.sum(kept[own]))))
+        old = self.rows
+        rows = replace(
+            old, means=sp.csr_array(old.means[kept]), normals=old.normals[kept], nodes=old.nodes[kept],
+            kept=np.arange(np.sum(kept)),
+        )  # fmt: skip
+        parts = [part for part, is_kept in zip(self.parts, kept, strict=True) if is_kept]
+        return Contacts(rows, self.gaps[kept], parts, self.facets, areas[kept], groups)
+
 
 def contacts_of(body: NodalBasis, mesh: PartedMesh, options: Options, held: Supports) -> Contacts:
     """Contact nodes on the facets of parts, and of the first part of every pair.

@@ -61,9 +61,14 @@ class DeckJoints:
             self._transform(transform)
         for pair in said.pairs:
             if pair.tied or said.interactions[pair.interaction].tied:
+                if isinstance(pair.adjust, str):
+                    raise InvalidArgumentError(
+                        f"{pair.place}: *CONTACT PAIR of tied surfaces has ADJUST={pair.adjust}; expected a distance"
+                    )
                 self._add("tie", [pair.slave, pair.master, *([] if pair.adjust is None else [pair.adjust])])
         for tie in said.ties:
-            self._check_surfaces(tie.place, "TIE", tie.slave, tie.master)
+            for name in (tie.slave, tie.master):
+                self.parts.check_surface(name, tie.place, "TIE")
             self._add("tie", [tie.slave, tie.master, *([] if tie.tolerance is None else [tie.tolerance])])
         for coupling in said.couplings:
             self._couple(coupling)
@@ -86,12 +91,6 @@ class DeckJoints:
 
     def _add(self, name: str, entry: Any) -> None:
         self.options.setdefault(name, []).append(entry)
-
-    def _check_surfaces(self, place: DeckPlace, card: str, *names: str) -> None:
-        for name in names:
-            if name not in self.deck.surfaces:
-                known = ", ".join(self.deck.surfaces) or "none"
-                raise InvalidArgumentError(f"{place}: *{card} names {name}; expected a surface, one of {known}")
 
     def _transform(self, given: Transform) -> None:
         rows = self.parts.in_bodies(self.deck.nodes_of(given.nodes, given.place))
@@ -130,10 +129,7 @@ class DeckJoints:
                     f"{given.place}: *{given.card} has a node of a body as its reference; expected a node of no body"
                 )
             nodes, wanted = np.union1d(nodes, [row]), f"{wanted} with node {self.deck.node_name(row)}"
-            name = f"motion of {wanted}"
-            self.options.setdefault("reference", {})[name] = self.deck.points[row, : self.dimension].tolist()
-        else:
-            name = self.point(row)
+        name = self.point(row)
         self.rigid.add(name)
         if given.rotation is not None:
             self.turns[int(self.deck.nodes_of(given.rotation, given.place)[0])] = name
@@ -144,7 +140,9 @@ class DeckJoints:
         """Nodes of bodies that a coupling names, and a name for them."""
         deck, name = self.deck, given.target
         if given.card == "COUPLING":
-            self._check_surfaces(given.place, given.card, name)
+            if name not in deck.surfaces:
+                known = ", ".join(deck.surfaces) or "none"
+                raise InvalidArgumentError(f"{given.place}: *COUPLING names {name}; expected a surface, one of {known}")
             own = deck.surfaces[name]
             rows = own.nodes
             if rows is None:

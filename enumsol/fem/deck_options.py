@@ -30,20 +30,21 @@ _PLANES = {"plane strain": "strain", "plane stress": "stress", "axisymmetric": "
 
 
 def shared(deck: Deck, parts: DeckParts) -> dict[str, Any]:
-    """Options that are the same in all steps: materials, contacts.
+    """Options that are the same in all steps: materials; contacts are looked at.
 
     Raises
     ------
     InvalidArgumentError
         A material or a contact is not what is known here.
     """
-    return {**_materials(deck, parts), **_contacts(deck)}
+    _check_contacts(deck, parts)
+    return _materials(deck, parts)
 
 
 def _materials(deck: Deck, parts: DeckParts) -> dict[str, Any]:
     """Elastic constants and their axes, density and thickness by sets of elements, and the plane."""
     found: dict[str, dict[str, Any]] = {name: {} for name in _BY_MATERIAL}
-    for section, rows in _sections(deck):
+    for section, rows in elastic_sections(deck):
         name = parts.elements(rows, section.elements)
         material = deck.materials[section.material]
         if not material.elastic:
@@ -55,7 +56,7 @@ def _materials(deck: Deck, parts: DeckParts) -> dict[str, Any]:
         else:
             found["orthotropic"][name] = _engineering_constants(material)
             if section.orientation:
-                found["orientation"][name] = _axes(deck, section)
+                found["orientation"][name] = axes_of_section(deck, section)
         expansion = () if material.expansion is None else material.expansion.tolist()
         if len(expansion) > 1:
             raise InvalidArgumentError(
@@ -96,8 +97,14 @@ def _engineering_constants(material: Material) -> list[float]:
     return [*map(float, young), *map(float, poisson), *shear]
 
 
-def _axes(deck: Deck, section: Section) -> list[float]:
-    """Directions of the first two axes of the material of a section."""
+def axes_of_section(deck: Deck, section: Section) -> list[float]:
+    """Directions of the first two axes of the material of a section.
+
+    Raises
+    ------
+    InvalidArgumentError
+        It names no orientation, or one whose axes turn within an element.
+    """
     if section.orientation not in deck.orientations:
         known = ", ".join(deck.orientations) or "none"
         raise InvalidArgumentError(
@@ -120,8 +127,14 @@ def _axes(deck: Deck, section: Section) -> list[float]:
     return [*map(float, axes[0]), *map(float, axes[1])]
 
 
-def _sections(deck: Deck) -> list[tuple[Section, Integers]]:
-    """Sections of bodies with the rows of their elements."""
+def elastic_sections(deck: Deck) -> list[tuple[Section, Integers]]:
+    """Sections of bodies with the rows of their elements.
+
+    Raises
+    ------
+    InvalidArgumentError
+        An element has none or two of them, or one of another kind or without a material.
+    """
     bodies = np.concatenate([np.full(len(block.labels), deck.is_body(block)) for block in deck.blocks])
     found, without = [], bodies.copy()
     for section in deck.sections:
@@ -173,50 +186,54 @@ def _planes(deck: Deck, parts: DeckParts) -> Any:
     return {parts.elements(np.concatenate(own), f"plane {name}"): name for name, own in rows.items()}
 
 
-def _contacts(deck: Deck) -> dict[str, Any]:
-    """Pairs of surfaces that may touch."""
+def _check_contacts(deck: Deck, parts: DeckParts) -> None:
+    """Refuse contacts between what there is not."""
     said = deck.analysis
     if not said.pairs:
         raise InvalidArgumentError(f"{deck.path} has no *CONTACT PAIR; expected contact")
     for pair in said.pairs:
         for name in (pair.slave, pair.master):
-            if name not in deck.surfaces:
-                raise InvalidArgumentError(
-                    f"{pair.place}: *CONTACT PAIR names {name}; expected a surface, one of "
-                    f"{', '.join(deck.surfaces) or 'none'}"
-                )
+            parts.check_surface(name, pair.place, "CONTACT PAIR")
         if pair.interaction not in said.interactions:
             raise InvalidArgumentError(
                 f"{pair.place}: *CONTACT PAIR names the interaction {pair.interaction or 'nothing'}; expected one of "
                 f"{', '.join(said.interactions) or 'none'}"
             )
-    pairs = [(pair.slave, pair.master, *_gap(pair)) for pair in touching(deck)]
-    if not pairs:
+        if isinstance(pair.adjust, str):
+            deck.nodes_of(pair.adjust, pair.place)
+    if not _touching(deck, 0):
         raise InvalidArgumentError(f"{said.pairs[0].place}: all surfaces of *CONTACT PAIR are tied; expected contact")
-    return {"pairs": pairs}
 
 
-def touching(deck: Deck) -> list[ContactPair]:
-    """Pairs of surfaces that are not tied."""
-    said = deck.analysis
-    return [pair for pair in said.pairs if not (pair.tied or said.interactions[pair.interaction].tied)]
+def _touching(deck: Deck, step: int) -> list[ContactPair]:
+    """Pairs of surfaces that may touch in a step: not tied, and not taken out of contact by then."""
+    said, removed = deck.analysis, dict[tuple[str, str], bool]()
+    for own in said.steps[:step]:
+        removed |= {pair: not there for pair, there in own.contacts.items()}
+    apart = [pair for pair in said.pairs if not (pair.tied or said.interactions[pair.interaction].tied)]
+    return [pair for pair in apart if not removed.get((pair.slave, pair.master), False)]
 
 
-def _gap(pair: ContactPair) -> list[Any]:
-    """The gap of a pair, where it is not that of the geometry."""
-    return [] if pair.clearance is None else [pair.clearance]
-
-
-def friction(deck: Deck, step: int) -> dict[str, float]:
-    """Coefficients of friction in a step, by surfaces.
+def contacts(deck: Deck, step: int) -> dict[str, Any]:
+    """Options for the pairs that may touch in a step (0: before the first), and their coefficients of friction.
 
     Raises
     ------
     InvalidArgumentError
-        A surface has two.
+        There are none, or a surface has two coefficients.
     """
+    touching = _touching(deck, step)
+    if not touching:
+        place = deck.analysis.steps[step - 1].place
+        raise InvalidArgumentError(f"{place}: no pair is in contact in step {step}; expected one, or --step")
+    pairs = [(pair.slave, pair.master, *([] if pair.clearance is None else [pair.clearance])) for pair in touching]
+    return {"pairs": pairs, "friction": _friction(deck, touching, step)}
+
+
+def _friction(deck: Deck, touching: list[ContactPair], step: int) -> dict[str, float]:
+    """Coefficients of friction in a step, by surfaces."""
     said, found = deck.analysis, dict[str, float]()
-    for pair in touching(deck):
+    for pair in touching:
         value = said.interactions[pair.interaction].friction
         for own in said.steps[:step]:
             value = own.friction.get(pair.interaction, value)
@@ -292,26 +309,28 @@ def _on_nodes(
         else:
             of_lines.setdefault(place, {}).setdefault(row, {})[entry] = value
     found: dict[str, list[Any]] = {}
-    for place, nodes in of_lines.items():
-        parts.told_of_loose(np.array(list(nodes)), kind, place)
-        groups: dict[Any, list[int]] = {}
-        for row, own in nodes.items():
-            groups.setdefault(tuple(sorted(own.items())), []).append(row)
-        for given, rows in groups.items():
-            inside = parts.in_bodies(np.array(rows))
-            if len(inside):
-                wanted = _wanted(deck, inside, f"{kind.lower()} of line {place.line}")
-                name = parts.nodes(inside, wanted) if kind == "BOUNDARY" else parts.exactly(inside, wanted)
-                for k, value in given:
-                    found.setdefault(name, [free] * dimension)[k] = value
+    names = {rows.tobytes(): name for name, rows in reversed(deck.node_sets.items())}
+    for place, given, rows in _groups(of_lines):
+        parts.told_of_loose(rows, kind, place)
+        inside = parts.in_bodies(rows)
+        if len(inside):
+            wanted = names.get(inside.tobytes(), f"{kind.lower()} of line {place.line}")
+            name = parts.nodes(inside, wanted) if kind == "BOUNDARY" else parts.exactly(inside, wanted)
+            for k, value in given:
+                found.setdefault(name, [free] * dimension)[k] = value
     return found, points
 
 
-def _wanted(deck: Deck, rows: Integers, otherwise: str) -> str:
-    """Name of a set of nodes that has just these, or another one."""
-    ordered = np.sort(rows)
-    same = (name for name, own in deck.node_sets.items() if np.array_equal(np.sort(own), ordered))
-    return next(same, otherwise)
+def _groups(
+    of_lines: dict[DeckPlace, dict[int, dict[int, float]]],
+) -> list[tuple[DeckPlace, tuple[tuple[int, float], ...], Integers]]:
+    """Nodes to which a line gives the same, with what it gives them; lines of single nodes together."""
+    groups: dict[Any, tuple[DeckPlace, list[int]]] = {}
+    for place, nodes in of_lines.items():
+        for row, own in nodes.items():
+            given = tuple(sorted(own.items()))
+            groups.setdefault((given, place if len(nodes) > 1 else None), (place, []))[1].append(row)
+    return [(place, given, np.unique(rows)) for (given, _), (place, rows) in groups.items()]
 
 
 def _pressures(deck: Deck, parts: DeckParts, state: DeckState) -> dict[str, float]:
@@ -353,7 +372,7 @@ def _volume_forces(deck: Deck, parts: DeckParts, state: DeckState) -> dict[str, 
         place = state.places["GRAV", target, direction]
         wanted = deck.elements_of(str(target), place)
         axis = np.array([float(part) for part in str(direction).split()])
-        for section, rows in _sections(deck):
+        for section, rows in elastic_sections(deck):
             density = deck.materials[section.material].density
             own = np.intersect1d(rows, wanted)
             if len(own) and density is None:

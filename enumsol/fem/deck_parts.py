@@ -5,14 +5,15 @@ from __future__ import annotations
 from dataclasses import replace
 from functools import cached_property
 from types import MappingProxyType
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
+from enumsol.decks.faces import face_nodes, faces_of_nodes
 from enumsol.decks.model import Account, Surface
 from enumsol.errors import InvalidArgumentError
+from enumsol.fem.cell_blocks import completing
 from enumsol.fem.mesh_files import mesh_of_deck
-from enumsol.model.cells import KINDS, by_kind
 from enumsol.support.messages import counted
 
 if TYPE_CHECKING:
@@ -20,7 +21,7 @@ if TYPE_CHECKING:
     from enumsol.decks.model import Deck
     from enumsol.fem.meshes import PartedMesh
     from enumsol.fem.scenes import Scene
-    from enumsol.support.array_types import Floats, Integers
+    from enumsol.support.array_types import Floats, Integers, Mask
 
 
 class DeckParts:
@@ -34,41 +35,68 @@ class DeckParts:
 
     def nodes(self, rows: Integers, wanted: str) -> str:
         """Name of a set of nodes, the one that is wanted if it has these."""
-        return self._named("nodes", self._deck.node_sets, np.unique(rows), wanted, lambda own: own)
+        return self._set("nodes", self._deck.node_sets, rows, wanted)
 
     def elements(self, rows: Integers, wanted: str) -> str:
         """Name of a set of elements."""
-        return self._named("elements", self._deck.element_sets, np.unique(rows), wanted, lambda own: own)
+        return self._set("elements", self._deck.element_sets, rows, wanted)
 
     def faces(self, faces: Integers, wanted: str, place: DeckPlace) -> str:
         """Name of a surface of faces (k, 2)."""
-        return self._named(
-            "faces",
-            self._deck.surfaces,
-            np.unique(faces, axis=0),
-            wanted,
-            lambda own: Surface(place, own),
-            lambda own: own.faces,
-        )
+        faces, known = np.unique(faces, axis=0), self._deck.surfaces.get(wanted)
+        name = self._name("faces", faces, wanted, None if known is None else known.faces)
+        self._deck.surfaces.setdefault(name, Surface(place, faces))
+        return name
 
-    def _named(self, kind: str, sets: Any, rows: Integers, wanted: str, made: Any, of: Any = lambda own: own) -> str:
-        key = (kind, rows.tobytes())
-        if key in self._names:
-            return self._names[key]
-        name = wanted
-        if not (name in sets and np.array_equal(np.sort(of(sets[name]), axis=0), rows)):
-            count = 1
-            while name in self._taken:
+    def _set(self, kind: str, sets: dict[str, Integers], rows: Integers, wanted: str) -> str:
+        rows = np.unique(rows)
+        name = self._name(kind, rows, wanted, sets.get(wanted))
+        sets.setdefault(name, rows)
+        return name
+
+    def _name(self, kind: str, rows: Integers, wanted: str, known: Integers | None) -> str:
+        """Name of these rows: the one they have, or the one that is wanted if they are what is known by it, or new."""
+        key, name, count = (kind, rows.tobytes()), wanted, 1
+        if key not in self._names:
+            is_known = known is not None and np.array_equal(known, rows)
+            while name in self._taken and not (name == wanted and is_known):
                 count += 1
                 name = f"{wanted} ({count})"
-            sets[name] = made(rows)
             self._taken.add(name)
-        self._names[key] = name
-        return name
+            self._names[key] = name
+        return self._names[key]
+
+    def check_surface(self, name: str, place: DeckPlace, card: str) -> None:
+        """Refuse what is no surface of a card of contacts; a surface of nodes becomes the facets that have these.
+
+        Raises
+        ------
+        InvalidArgumentError
+            There is none, or a node of it belongs to no facet of such nodes.
+        """
+        own = self._deck.surfaces.get(name)
+        if own is None:
+            known = ", ".join(self._deck.surfaces) or "none"
+            raise InvalidArgumentError(f"{place}: *{card} names {name}; expected a surface, one of {known}")
+        if own.nodes is None:
+            return
+        rows = self.in_bodies(own.nodes)
+        faces = faces_of_nodes(self._deck, rows)
+        covered = [nodes.ravel() for _, nodes in face_nodes(self._deck, faces)]
+        bare = np.setdiff1d(rows, np.concatenate([np.zeros(0, dtype=np.int64), *covered]))
+        if len(bare) or not len(rows):
+            lost = f"node {self._deck.node_name(int(bare[0]))}" if len(bare) else "no node of a body"
+            raise InvalidArgumentError(
+                f"{own.place}: *SURFACE {name} has {lost}, which belongs to no facet whose nodes are all in it; "
+                "expected the nodes of whole facets, or TYPE=ELEMENT"
+            )
+        self._deck.surfaces[name] = Surface(own.place, faces)
+        entry = Account(own.place, "SURFACE", f"nodes of {name} are those of {counted(len(faces), 'facet')}")
+        self._deck.account.append(entry)
 
     def in_bodies(self, rows: Integers) -> Integers:
         """Nodes among these that belong to bodies."""
-        return rows[np.isin(rows, self._used)]
+        return rows[self._is_used[rows]]
 
     def exactly(self, rows: Integers, wanted: str) -> str:
         """Name of a set of these nodes alone, without nodes that elements of 20 nodes get in the middle of facets."""
@@ -105,39 +133,45 @@ class DeckParts:
     def at_nodes(self, mesh: PartedMesh, values: Floats) -> Floats:
         """Values at all nodes of the mesh, of those at the nodes of the deck.
 
-        Nodes in the middle of facets and of elements of 20 nodes have what the shape functions of these give.
+        Nodes that complete elements have what the shape functions of these give.
         """
         found = np.zeros(len(mesh.points))
-        found[: len(self._used)] = values[self._used]
-        for _, cells in by_kind(mesh.points.shape[1], mesh.cells) if len(found) > len(self._used) else ():
-            if cells.shape[1] == 27:
-                sides = cells[:, KINDS[3, 27].facets]
-                corners, between = found[sides[..., :4]].sum(axis=2), found[sides[..., 4:8]].sum(axis=2)
-                found[sides[..., 8]] = 0.5 * between - 0.25 * corners
-                found[cells[:, 26]] = 0.25 * (found[cells[:, 8:20]].sum(axis=1) - found[cells[:, :8]].sum(axis=1))
+        found[: len(self.used)] = values[self.used]
+        for nodes, shares in completing(mesh.points.shape[1], mesh.cells, len(self.used)):
+            found[nodes[:, 0]] = found[nodes[:, 1:]] @ shares
         return found
 
     def mesh(self) -> PartedMesh:
         """Mesh of the deck with all of these."""
         mesh = mesh_of_deck(self._deck)
-        exact = {name: np.searchsorted(self._used, rows) for name, rows in self._exact.items()}
+        exact = {name: np.searchsorted(self.used, rows) for name, rows in self._exact.items()}
         return replace(mesh, node_sets=MappingProxyType({**mesh.node_sets, **exact})) if exact else mesh
 
     @cached_property
-    def _used(self) -> Integers:
+    def used(self) -> Integers:
         """Rows of the nodes of bodies, in the order in which its mesh has them."""
         own = [block.nodes.ravel() for block in self._deck.blocks if self._deck.is_body(block)]
         return np.unique(np.concatenate([np.zeros(0, dtype=np.int64), *own]))
 
-    def adjusted(self, scene: Scene) -> PartedMesh | None:
-        """Mesh whose contact nodes are moved onto what they face where the deck says so; None if it moves none."""
+    @cached_property
+    def _is_used(self) -> Mask:
+        found = np.zeros(len(self._deck.points), dtype=bool)
+        found[self.used] = True
+        return found
+
+    def adjusted(self, scene: Scene) -> PartedMesh:
+        """Mesh whose contact nodes are moved onto what they face where the deck says so."""
         points, first = scene.mesh.points.copy(), 0
-        distances = {(pair.slave, pair.master): pair.adjust for pair in self._deck.analysis.pairs}
+        adjusts = {(pair.slave, pair.master): pair.adjust for pair in self._deck.analysis.pairs}
         for group, gaps in scene.gaps_of_groups:
             own = slice(first, first := first + group.count)
-            distance = None if group.pair is None else distances.get((group.pair.slave, group.pair.master))
-            if distance is not None:
-                near = (gaps <= distance) & (gaps != 0)
-                rows = scene.contacts.rows
+            adjust = None if group.pair is None else adjusts.get((group.pair.slave, group.pair.master))
+            rows = scene.contacts.rows
+            if isinstance(adjust, str):
+                chosen = np.searchsorted(self.used, self.in_bodies(self._deck.node_sets[adjust]))
+                near = np.isin(rows.nodes[own], chosen) & (gaps != 0)
+            elif adjust is not None:
+                near = (gaps <= adjust) & (gaps != 0)
+            if adjust is not None:
                 points[rows.nodes[own][near]] += gaps[near, None] * rows.normals[own][near]
-        return replace(scene.mesh, points=points) if np.any(points != scene.mesh.points) else None
+        return replace(scene.mesh, points=points)

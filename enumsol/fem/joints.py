@@ -155,9 +155,14 @@ class Joints:
 
     def padded(self, K: sp.csc_array) -> sp.csc_array:
         """A matrix of the nodes, with zeros for reference points."""
-        K = sp.csc_array(K)
-        K.resize(self.references.count, self.references.count)
-        return K
+        return resized(K, self.references.count)
+
+
+def resized(K: sp.csc_array, count: int) -> sp.csc_array:
+    """A square matrix with rows and columns of zeros behind its own, (count, count)."""
+    other = sp.csc_array(K, copy=True)
+    other.resize(count, count)
+    return other
 
 
 def joints_of(body: NodalBasis, mesh: PartedMesh, options: Options, held: Supports) -> Joints:

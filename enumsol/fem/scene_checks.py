@@ -188,7 +188,8 @@ def scene_notes(scene: Scene) -> list[str]:
 
 def _formulations(scene: Scene) -> list[str]:
     """Notes on elements of the file that others take the place of."""
-    kinds = [kind for kind in map(element_type, scene.mesh.types) if kind is not None and kind.is_body]
+    own = scene.mesh.types if scene.stiffness is None else ()  # another code has them as they are
+    kinds = [kind for kind in map(element_type, own) if kind is not None and kind.is_body]
     return [
         f"elements of type {kind.name} are taken as {kind.plain}, with full integration and without incompatible "
         "modes, hybrid or modified formulations, which can be stiffer in bending than the program of the file has them"

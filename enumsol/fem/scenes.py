@@ -16,7 +16,7 @@ from enumsol.fem.bases import NodalBasis
 from enumsol.fem.bodies import BodyPiece
 from enumsol.fem.conditions import FRICTION, Options
 from enumsol.fem.contacts import Contacts, Group
-from enumsol.fem.joints import Joints
+from enumsol.fem.joints import Joints, resized
 from enumsol.fem.meshes import PartedMesh, unit_vectors
 from enumsol.fem.restrained import Body, Supports, axes_of, problem_of
 from enumsol.model.cells import KINDS, boundary_facets, by_kind, facet_outlines, lines_along
@@ -73,6 +73,9 @@ class Scene:
         Mass per volume, in 2D per area, of the cells; None where it is uniform and not given.
     stress : (M, s) array or None
         Mean stresses of the cells with no displacement, of a change of temperature [force / length^2].
+    stiffness : (k, k) csc_array or None
+        What another code assembled in place of the body's own: by all displacements, and behind them those that only
+        its elements have [force / length].
     notes : list of str
         What may not have been intended, each in a sentence.
     """
@@ -90,6 +93,7 @@ class Scene:
     pieces: list[BodyPiece]
     masses: Floats | None = None
     stress: Floats | None = None
+    stiffness: sp.csc_array | None = None
     notes: list[str] = field(default_factory=list)
 
     @property
@@ -125,6 +129,11 @@ class Scene:
         other = None if friction is None else 0.0
         parts = self.contacts.parts
         return of_rows(F, name, parts, finite_number), of_rows(slope, f"{name}_slope", parts, finite_number, other)
+
+    @cached_property
+    def tangents(self) -> tuple[Floats, ...]:
+        """Tangents of the contact nodes, one in 2D and two in 3D, each (p, d)."""
+        return _axes(self.contacts.rows, self.options.axis, self.dimension)
 
     @property
     def gaps_of_groups(self) -> list[tuple[Group, Floats]]:
@@ -196,16 +205,19 @@ class Scene:
             surface, more = outward(contacts.facets, mesh.cells), {"areas": contacts.areas}
         gaps, coefficients = self.gaps, self.coefficients
         modes, bound = self._rigid_modes()
-        elastic = self.body.stiffness(self.material.elasticity)
-        stiffness = sp.csc_array(self.joints.padded(elastic) + self.springs)
+        mass = self._mass()
+        elastic = self.stiffness
+        if elastic is None:
+            elastic = self.joints.padded(self.body.stiffness(self.material.elasticity))
+        count = elastic.shape[0]
         forces, slope = (
-            np.append(own, more) for own, more in ((self.forces, self.joints.forces), (self.slope, self.joints.slope))
+            np.concatenate([own.ravel(), other, np.zeros(count - self.joints.references.count)])
+            for own, other in ((self.forces, self.joints.forces), (self.slope, self.joints.slope))
         )
         named = self.joints.references.named
-        axes = _axes(nodes, self.options.axis, self.dimension)
         problem = problem_of(
             Body(
-                stiffness,
+                sp.csc_array(elastic + resized(self.springs, count)),
                 forces,
                 slope if np.any(slope) else None,
                 supports,
@@ -213,9 +225,9 @@ class Scene:
                 named=named,
             ),
             nodes,
-            axes,
-            modes=modes,
-            mass=self._mass(),
+            self.tangents,
+            modes=None if modes is None else np.pad(modes, ((0, count - len(modes)), (0, 0))),
+            mass=None if mass is None else resized(mass, count),
             mesh=lambda motion, moved: BodyMesh(mesh.points, mesh.cells, motion, moved, surface, **self._kept()),
             gap=gaps,
             node_ids=mesh.node_names(nodes.nodes),

@@ -1,6 +1,5 @@
 """Coulomb friction as a fixed point of Tresca problems, in 2D and 3D (theory, section 11; paper, Sections 2 and 3)."""
 
-from enumsol.fixed_points.clarabel_solver import TrescaReference
 from enumsol.fixed_points.lipschitz import LipschitzEstimate, lipschitz_estimate
 from enumsol.fixed_points.result import FixedPoint, Outcome
 from enumsol.fixed_points.successive import (
@@ -10,7 +9,7 @@ from enumsol.fixed_points.successive import (
     successive_approximations,
 )
 from enumsol.fixed_points.tresca import TrescaSolution, solve_tresca
-from enumsol.fixed_points.tresca_newton import TrescaNotFeasible, TrescaNotSolved
+from enumsol.fixed_points.tresca_solvers import TrescaNotFeasible, TrescaNotSolved, TrescaReference
 
 __all__ = [
     "FixedPoint",

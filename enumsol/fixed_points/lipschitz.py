@@ -9,7 +9,7 @@ import numpy as np
 import scipy.sparse as sp
 from scipy.linalg import eigh
 
-from enumsol.condensation.condensed import RHS_BLOCK
+from enumsol.condensation.factorization import RHS_BLOCK
 from enumsol.errors import InvalidArgumentError
 from enumsol.fixed_points.system import ContactSystem, checked_problem
 from enumsol.fixed_points.tresca import node_values
@@ -85,7 +85,7 @@ class _Coefficients:
 
 
 @dataclass(frozen=True)
-class _Slips:
+class _SlipDependence:
     """The slips that coefficients depend on, by tangential displacements at other places where they are means."""
 
     S_tt: Floats
@@ -94,7 +94,7 @@ class _Slips:
     root: Floats | None = None
 
     @classmethod
-    def of(cls, body: Problem, S_tt: Floats) -> _Slips:
+    def of(cls, body: Problem, S_tt: Floats) -> _SlipDependence:
         """Slips of a problem; compliances are condensed to the degrees of freedom that occur in the means."""
         mean = body.slip_mean if isinstance(body, ContactProblem3D) and body.depends_on_solution else None
         if mean is None:
@@ -174,7 +174,7 @@ def lipschitz_estimate(
     blocks = S_tt.reshape(d, p, d, p)[:, np.arange(p), :, np.arange(p)]
     c_inf = np.sqrt(np.linalg.eigvalsh(blocks)[:, -1])
 
-    slips = _Slips.of(body, S_tt)
+    slips = _SlipDependence.of(body, S_tt)
     reach = slips.reach(body, system.alpha, load, c_inf) if isinstance(body, ContactProblem3D) else c_inf * load
     used = _coefficients(system, reach, given)
     most_F = float(np.max(used.F)) or 1.0  # taken out, so that squares of tiny coefficients do not underflow

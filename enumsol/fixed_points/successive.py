@@ -17,7 +17,7 @@ from enumsol.errors import InvalidArgumentError
 from enumsol.fixed_points.result import FixedPoint, Outcome
 from enumsol.fixed_points.system import ContactSystem, checked_problem
 from enumsol.fixed_points.tresca import node_values, scaled_unknowns, slips_of, solve_scaled
-from enumsol.fixed_points.tresca_newton import TrescaData, TrescaNotFeasible, TrescaNotSolved
+from enumsol.fixed_points.tresca_solvers import TrescaData, TrescaNotFeasible, TrescaNotSolved
 from enumsol.model.problem3d import ContactProblem3D, warn_of_jumps
 from enumsol.support.arguments import optional_callable, positive_integer, positive_number
 from enumsol.support.array_arguments import real_array

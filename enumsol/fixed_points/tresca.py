@@ -12,7 +12,14 @@ import numpy as np
 from enumsol.condensation.condensed import condensation_of
 from enumsol.errors import InvalidArgumentError
 from enumsol.fixed_points.system import ContactSystem, checked_problem
-from enumsol.fixed_points.tresca_newton import ACCEPTED, TrescaData, TrescaNotFeasible, TrescaNotSolved
+from enumsol.fixed_points.tresca_solvers import (
+    ACCEPTED,
+    TrescaData,
+    TrescaNotFeasible,
+    TrescaNotSolved,
+    TrescaReference,
+    interior_point,
+)
 from enumsol.model.statuses import ContactStatus
 from enumsol.support.arguments import one_of
 from enumsol.support.array_arguments import real_array
@@ -322,8 +329,6 @@ def solve_scaled(data: TrescaData, start: Floats, first: str = "newton") -> tupl
     TrescaNotFeasible
         There is none, for a body that nothing holds.
     """
-    from enumsol.fixed_points.clarabel_solver import interior_point  # a fallback
-
     if not (np.any(data.system.g) or np.any(data.system.h)):
         return np.zeros(len(start)), 0.0, first
     found: list[tuple[float, str, Floats]] = []
@@ -350,8 +355,6 @@ def solve_scaled(data: TrescaData, start: Floats, first: str = "newton") -> tupl
 
 
 def _by_cvxpy(data: TrescaData) -> TrescaSolution:
-    from enumsol.fixed_points.clarabel_solver import TrescaReference  # CVXPY takes a while to import
-
     system = data.system
     reference = TrescaReference(system.problem)
     normal, tangential, u = reference.solve(data.bound * system.force, data.F, system.problem.load_at(system.alpha))

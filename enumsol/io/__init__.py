@@ -55,14 +55,14 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
-from enumsol.errors import InvalidArgumentError, InvalidProblemError
-from enumsol.io import fclib, matrix_market, npz
-from enumsol.io.assembled import (
+from enumsol.decks.assembled import (
     AssembledStiffness,
     read_abaqus_stiffness,
     read_ansys_stiffness,
     read_calculix_stiffness,
 )
+from enumsol.errors import InvalidArgumentError, InvalidProblemError
+from enumsol.io import fclib, matrix_market, npz
 from enumsol.model.problem import check_is_problem
 from enumsol.support.arguments import file_path
 from enumsol.support.files import writing

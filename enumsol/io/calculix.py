@@ -14,7 +14,7 @@ from enumsol.errors import InvalidArgumentError
 from enumsol.io.vtu import SolvedState, pictures_of
 from enumsol.support.arguments import file_path
 from enumsol.support.array_types import Floats, Integers
-from enumsol.support.files import write_file, writing
+from enumsol.support.files import reading, write_file, writing
 from enumsol.support.messages import counted
 
 if TYPE_CHECKING:
@@ -173,18 +173,29 @@ def read_results(path: str | os.PathLike[str]) -> list[NodalResult]:
     if place.suffix.lower() not in readers:
         raise InvalidArgumentError(f"{place} is no result file; expected a name that ends in .frd or .dat")
     try:
-        with place.open(encoding="latin-1") as lines:
+        with reading(place, "results", "CalculiX"), place.open(encoding="latin-1") as lines:
             found = list(readers[place.suffix.lower()](lines))
-    except OSError as error:
-        raise InvalidArgumentError(f"{place} cannot be read ({error.strerror}); expected a file of CalculiX") from error
     except InvalidArgumentError as error:
-        raise InvalidArgumentError(f"{place}: {error}") from error
-    except (ValueError, IndexError) as error:
-        raise InvalidArgumentError(f"{place} is damaged ({error}); expected a result file of CalculiX") from error
+        named = str(error).startswith(str(place))
+        raise error if named else InvalidArgumentError(f"{place}: {error}") from error
     if not found:
         output = "*NODE FILE" if place.suffix.lower() == ".frd" else "*NODE PRINT"
         raise InvalidArgumentError(f"{place} has no displacements; expected the output of {output} with U")
     return found
+
+
+def converged_time(path: str | os.PathLike[str]) -> float | None:
+    """Time of the last increment that converged, by the file ``.sta`` that CalculiX writes beside its results.
+
+    None if there is no such file, or none converged. After a run that was broken off the last displacements in a
+    ``.frd`` file are those of an increment that did not converge.
+    """
+    place = file_path(path, "path").with_suffix(".sta")
+    if not place.is_file():
+        return None
+    rows = [line.split() for line in place.read_text(encoding="latin-1").splitlines()]
+    done = [row[4] for row in rows if len(row) == 7 and all(word.isdigit() for word in row[:4])]
+    return float(done[-1]) if done else None
 
 
 def _frd(lines: Iterable[str]) -> Iterator[NodalResult]:
@@ -229,6 +240,8 @@ def _dat(lines: Iterable[str]) -> Iterator[NodalResult]:
         next(lines, "")
         for row in itertools.takewhile(str.strip, lines):
             number, *components = row.split()
+            if components[-1:] == ["L"]:
+                raise InvalidArgumentError("its displacements are in local axes; expected *NODE PRINT, GLOBAL=YES")
             values[int(number)] = list(map(float, components))[:3]
     for time, values in found.items():
         yield NodalResult(time, np.array(list(values), dtype=np.int64), np.array(list(values.values())), None)

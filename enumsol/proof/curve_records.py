@@ -14,7 +14,7 @@ from enumsol.proof.reading import (
     rational_from,
 )
 from enumsol.proof.records import ClosingRecord, Limits, Record, Tree
-from enumsol.trusted.space.curve_runs import Run
+from enumsol.trusted.space.curve_runs import LinkRange
 from enumsol.trusted.space.solution_curve import CurveBox
 
 if TYPE_CHECKING:
@@ -176,7 +176,7 @@ class OnCurve(ClosingRecord):
         if known is not other:
             return False
         if self.numbers is not None:
-            return piece.lies_on(known, Run(first, last), codes, self.numbers, errors)
+            return piece.lies_on(known, LinkRange(first, last), codes, self.numbers, errors)
         curves = [link.curve for link in known.chain.links[first : last + 1]]
         return piece.holds_all(codes, known.problem, curves, errors)
 

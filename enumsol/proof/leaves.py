@@ -27,16 +27,16 @@ from enumsol.proof.reading import (
 )
 from enumsol.proof.records import ClosingRecord, EnclosureRecord, Limits, Record, Tree
 from enumsol.support.array_types import Codes, Floats, Indices
+from enumsol.trusted.at_alpha import joint_root
 from enumsol.trusted.exclusion import Terms, exclusion_margin
 from enumsol.trusted.floating_bounds import is_unbalanced
-from enumsol.trusted.joint_roots import joint_root
 from enumsol.trusted.status_rows import CONTACT, ROW_KINDS, SLIP_MINUS, SLIP_PLUS, STICK, UNDECIDED, refines
 from enumsol.trusted.uniqueness import closed_solution, lone_root, numbers_of
 
 if TYPE_CHECKING:
     from enumsol.condensation.space_condensed import EnclosedSpace
     from enumsol.proof.reading import Row
-    from enumsol.trusted.joint_roots import JointRoot
+    from enumsol.trusted.at_alpha import JointRoot
     from enumsol.trusted.over_interval import EnclosedPiece
     from enumsol.trusted.quadratic_forms import EnclosedForm
     from enumsol.trusted.reference import Reference
@@ -155,7 +155,7 @@ class Unbalanced(Record):
             return within.is_unbalanced(codes, self.direction)
         if within.tangents == 1:
             return is_unbalanced(within, codes, self.direction)
-        from enumsol.trusted.space.resultants import is_unbalanced_in_space  # in 3D only
+        from enumsol.trusted.space.force_bound import is_unbalanced_in_space  # in 3D only
 
         return is_unbalanced_in_space(cast("EnclosedSpace", within), codes, self.direction)
 

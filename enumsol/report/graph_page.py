@@ -14,13 +14,13 @@ from enumsol.branches.figures.curves import QUANTITIES, Curve, curves, side_by_s
 from enumsol.branches.figures.panels import colour_of, family_states
 from enumsol.branches.graph_data import about_stability, branch_stability
 from enumsol.model.problem import ContactProblem
-from enumsol.report.body import body_record
 from enumsol.report.parts import (
     CERTIFIED_DATA,
     DRAWING,
     STATUS_NAMES,
     Heading,
     Statement,
+    body_record,
     filled_page,
     packed_plotly,
     proof_commands,

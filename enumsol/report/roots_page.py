@@ -9,19 +9,24 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from enumsol.model.shapes import body_shape
-from enumsol.report.body import bare_nodes, drawn_body, most_fields, short_list, surface_stresses, vectors
 from enumsol.report.parts import (
     CERTIFIED_DATA,
     DRAWING,
     STATUS_NAMES,
     Heading,
     Statement,
+    bare_nodes,
+    drawn_body,
     filled_page,
+    most_fields,
     packed_plotly,
     proof_commands,
+    short_list,
     span_words,
     status_codes,
+    surface_stresses,
     table_text,
+    vectors,
     with_unit,
 )
 from enumsol.roots.root import summary

@@ -19,7 +19,7 @@ from enumsol.model.statuses import (
     ContactStatus,
     contact_status,
 )
-from enumsol.roots.linearisation import SelectionTangent, SlipSigns, named_statuses, sign_over
+from enumsol.roots.local_branch import SelectionTangent, SlipSigns, named_statuses, sign_over
 from enumsol.roots.root import Enclosure, Polytope, Root, RootFamily
 from enumsol.roots.root_set import Undecided
 

@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from pathlib import Path
 
     from enumsol.condensation.condensed import CondensedProblem
-    from enumsol.roots.linearisation import SelectionTangent, SlipSigns
+    from enumsol.roots.local_branch import SelectionTangent, SlipSigns
     from enumsol.support.array_types import Alpha, Floats, NDArray
 
 #: Contact nodes of a printed root; of larger ones the first are shown.

@@ -27,7 +27,7 @@ from enumsol.model.statuses import (
     space_status,
 )
 from enumsol.roots.enumeration import Enumeration
-from enumsol.roots.linearisation import SelectionTangent
+from enumsol.roots.local_branch import SelectionTangent
 from enumsol.roots.root import Enclosure, Root
 from enumsol.roots.root_set import RootSet, Undecided
 from enumsol.search.space.open_leaves import Cause

@@ -46,8 +46,8 @@ if TYPE_CHECKING:
     from enumsol.search.reduction import Point
     from enumsol.selections.rational_selections import ExactSelections
     from enumsol.support.array_types import Alpha, Codes, Floats
+    from enumsol.trusted.arcs.precise import PreciseAtAlpha
     from enumsol.trusted.at_alpha import VerifiedSelection
-    from enumsol.trusted.precise_at_alpha import PreciseAtAlpha
 
 Arithmetic = Literal["fast", "verified", "exact"]
 _T = TypeVar("_T")
@@ -266,7 +266,7 @@ class Solvers(SearchSetup):
     def _precise(self) -> PreciseAtAlpha | None:
         """The problem at this alpha in many digits; None for small ones, which rationals decide as fast."""
         from enumsol.condensation.exact import FAST_EXACT_DOF
-        from enumsol.trusted.precise_at_alpha import PreciseAtAlpha  # python-flint
+        from enumsol.trusted.arcs.precise import PreciseAtAlpha  # python-flint
 
         if self.problem.n <= FAST_EXACT_DOF or self.data == "condensed" or not self.problem.held:
             return None

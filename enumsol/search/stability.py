@@ -26,7 +26,7 @@ from enumsol.support.deadlines import look
 from enumsol.trusted.running_away import Growing, Motion, Motions, NoMotion
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
+    from collections.abc import Callable, Iterator
 
     from enumsol.condensation.dynamic import DynamicStiffness
     from enumsol.support.array_types import Floats, Integers
@@ -49,15 +49,15 @@ class Proven:
 
     Attributes
     ----------
-    ranges : tuple of (low, high, leaves)
-        In each nothing grows, by the certificates ``leaves``, which decide all nodes at their limit.
+    leaves : tuple of NoMotion
+        Certificates by which nothing grows, by range.
     growing : tuple of (certificate, Motion)
         By growth rate, the largest first.
     gaps : tuple of (low, high)
         Ranges of mu of which neither is proven.
     """
 
-    ranges: tuple[tuple[float, float, tuple[NoMotion, ...]], ...]
+    leaves: tuple[NoMotion, ...]
     growing: tuple[tuple[Growing, Motion], ...]
     gaps: tuple[tuple[float, float], ...]
 
@@ -70,11 +70,14 @@ class StabilitySearch:
     ----------
     stiffness : DynamicStiffness
     motions : Motions
+    most_programs : int
+        Semidefinite programs that are solved at most.
     """
 
     stiffness: DynamicStiffness
     motions: Motions
-    _ranges: list[tuple[float, float, tuple[NoMotion, ...]]] = field(default_factory=list)
+    most_programs: int = _PROGRAMS
+    _leaves: list[NoMotion] = field(default_factory=list)
     programs: int = 0
 
     def run(self) -> Proven:
@@ -86,9 +89,9 @@ class StabilitySearch:
         search = GrowingMotions(self.stiffness, self.motions)
         growing = [] if self.motions.unsure else [found for low, high in gaps for found in search.between(low, high)]
         growing.sort(key=lambda item: -item[0].low)
-        if not growing and (self.stiffness.stiffest or self.stiffness.steepest) is not None:
-            gaps = [gap for low, high in gaps for gap in self._by_weights(low, high)]
-        return Proven(tuple(sorted(self._ranges, key=lambda item: item[0])), tuple(growing), tuple(_joined(gaps)))
+        if not growing and self._limit is not None:
+            gaps = [gap for ends in gaps for gap in self._divided(*ends, _NARROWEST, self._by_weights)]
+        return Proven(tuple(sorted(self._leaves, key=lambda leaf: leaf.low)), tuple(growing), tuple(_joined(gaps)))
 
     # -- plain numbers
 
@@ -96,16 +99,15 @@ class StabilitySearch:
         """Ranges, from 0 on, in which plain numbers do not serve."""
         low, high = 0.0, self._first
         last = high * STRIDE**_DECADES
-        numbers = self._far()
         while low < last:
-            if numbers is not None and self._try(low, np.inf, *numbers):
+            if self._try(low, np.inf) or (low and self._far and self._try(low, np.inf, *self._far)):
                 return
             far = next((mu for mu in (STRIDE**2 * high, STRIDE * high) if self._serve_to(low, mu)), None)
             if far is None:
-                yield from self._halved(low, high)
+                yield from self._divided(low, high, _NARROW, self._by_plain)
             low = high if far is None else far
             high = low * STRIDE
-            if numbers is None and low > largest_eigenvalue(self.stiffness):
+            if self._limit is None and low > largest_eigenvalue(self.stiffness):
                 break
         yield low, np.inf
 
@@ -114,38 +116,46 @@ class StabilitySearch:
         K = self.stiffness.at(high)
         return K is not None and serves(self.motions, K.mid) and self._try(low, high)
 
-    def _far(self) -> tuple[Floats, Floats] | None:
-        """Weights and products that may serve for large mu; plain ones if these do."""
-        far = self.stiffness.stiffest or self.stiffness.steepest
-        if far is None:
+    @cached_property
+    def _limit(self) -> Floats | None:
+        """K for large mu, up to a factor and in floats."""
+        slope, most = self.stiffness.steepest, self.stiffness.stiffest
+        if slope is None or most is None:
             return None
-        k = len(self.motions.signed)
-        plain = np.eye(k), np.zeros((k, k))
-        return plain if serves(self.motions, far.mid) else self._weights(far.mid, (), ())
+        return STRIDE**2 * largest_eigenvalue(self.stiffness) * slope.mid + most.mid
 
-    def _halved(self, low: float, high: float) -> Iterator[tuple[float, float]]:
-        """Parts of a range in which plain numbers do not serve."""
+    @cached_property
+    def _far(self) -> tuple[Floats, Floats] | None:
+        """Weights and products that may serve for large mu where plain numbers do not."""
+        if self._limit is None or serves(self.motions, self._limit):
+            return None
+        return self._weights(self._limit, (), ())
+
+    def _divided(
+        self, low: float, high: float, narrow: float, proves: Callable[[float, float], bool | None]
+    ) -> Iterator[tuple[float, float]]:
+        """Parts of a range in which nothing is proven; ``proves`` gives None where shorter ones will not do either."""
         look()
+        proven = proves(low, high)
+        middle = None if proven is None else self._middle(low, high, narrow)
+        if middle is not None and not proven:
+            yield from self._divided(low, middle, narrow, proves)
+            yield from self._divided(middle, high, narrow, proves)
+        elif not proven:
+            yield low, high
+
+    def _by_plain(self, low: float, high: float) -> bool | None:
+        """Whether plain numbers serve in a range."""
         ends = [self.stiffness.at(mu) for mu in (low, high)]
         serving = [K is not None and serves(self.motions, K.mid) for K in ends]
-        if all(serving) and self._try(low, high):
-            return
-        if not any(serving):
-            yield low, high
-            return
-        middle = self._middle(low, high, _NARROW)
-        if middle is None:
-            yield low, high
-            return
-        yield from self._halved(low, middle)
-        yield from self._halved(middle, high)
+        return (all(serving) and self._try(low, high)) if any(serving) else None
 
     def _try(self, low: float, high: float, weights: Floats | None = None, products: Floats | None = None) -> bool:
         """True if some numbers serve in a range, which is then noted."""
         tried = self._certificate(low, high, weights, products)
         if tried is None:
             return False
-        self._ranges.append((low, high, (tried,)))
+        self._leaves.append(tried)
         return True
 
     def _certificate(
@@ -170,16 +180,16 @@ class StabilitySearch:
 
     def _scaled(self, products: Floats, low: float, high: float) -> tuple[Floats, Floats]:
         """Products, found for a K of norm one, at both ends of a range."""
-        first, last = self.stiffness.at(low), None if np.isinf(high) else self.stiffness.at(high)
-        last = last or self.stiffness.stiffest or self.stiffness.steepest
-        one, other = (0.0 if K is None else float(np.linalg.norm(K.mid)) for K in (first, last))
-        return one * products, other * products
+        ends = self.stiffness.at(low), self.stiffness.steepest if np.isinf(high) else self.stiffness.at(high)
+        one, other = (0.0 if K is None else float(np.linalg.norm(K.mid)) for K in ends)
+        # rows that yield have no slope
+        return one * products, other * products * (not (np.isinf(high) and np.any(self.stiffness.yields)))
 
     def _beside(self, low: float, high: float) -> tuple[float | None, ...]:
         """Other mu from which slopes of K may be taken."""
         known = [mu for mu in self.stiffness.known if 0 <= mu < low]
         if np.isinf(high):
-            return (None,) if self.stiffness.stiffest is not None else (known[-1],) if known else ()
+            return (None,) if np.all(self.stiffness.yields) else tuple(known[-1:])
         if not known:
             return (None,)
         return (known[-1],) if known[-1] > 0.05 * low else (known[-1], 0.5 * low)
@@ -201,30 +211,21 @@ class StabilitySearch:
 
     # -- weights and products
 
-    def _by_weights(self, low: float, high: float) -> Iterator[tuple[float, float]]:
-        """Parts of a range in which weights and decided nodes do not serve either."""
-        look()
-        leaves = None
-        if self.programs < _PROGRAMS and low < high:
-            limit = self.stiffness.stiffest or self.stiffness.steepest
-            at = float(np.sqrt(max(low, 1e-3 * high) * high))
-            K = limit if np.isinf(high) else self.stiffness.at(at)
-            leaves = None if K is None else self._decided(low, high, K.mid, (), ())
-        if leaves is not None:
-            self._ranges.append((low, high, tuple(leaves)))
-            return
-        middle = None if self.programs >= _PROGRAMS else self._middle(low, high, _NARROWEST)
-        if middle is None:
-            yield low, high
-            return
-        yield from self._by_weights(low, middle)
-        yield from self._by_weights(middle, high)
+    def _by_weights(self, low: float, high: float) -> bool | None:
+        """Whether weights and decided nodes serve in a range."""
+        if self.programs >= self.most_programs:
+            return None
+        at = float(np.sqrt(max(low, 1e-3 * high) * high))
+        K = self._limit if np.isinf(high) else None if (own := self.stiffness.at(at)) is None else own.mid
+        leaves = None if K is None else self._decided(low, high, K, (), ())
+        self._leaves += leaves or []
+        return leaves is not None
 
     def _decided(
         self, low: float, high: float, K: Floats, slides: tuple[int, ...], stays: tuple[int, ...]
     ) -> list[NoMotion] | None:
         """Certificates for a range that decide nodes at their limit as far as it takes."""
-        if self.programs >= _PROGRAMS:
+        if self.programs >= self.most_programs:
             return None
         found = self._weights(K, slides, stays)
         if found is not None:

@@ -14,8 +14,16 @@ from flint import fmpq, fmpq_mat
 from enumsol.arithmetic.rationals import as_objects, rational, to_fraction
 from enumsol.condensation.exact import ExactCondensed, ExactSystem, UncondensedSystem
 from enumsol.model.statuses import CONDITIONS, FINAL, FRICTIONLESS, OPEN, SLIP_MINUS, SLIP_PLUS, STICK, RowKind
-from enumsol.selections.polytopes import Form, Point, dot, polytope_vertices, value
-from enumsol.selections.solution import ActiveSets, SelectionSolution, VertexLimitError
+from enumsol.selections.solution import (
+    ActiveSets,
+    Form,
+    Point,
+    SelectionSolution,
+    VertexLimitError,
+    dot,
+    polytope_vertices,
+    value,
+)
 from enumsol.support.deadlines import look
 from enumsol.trusted.selection import Selection, row_values
 
@@ -23,7 +31,7 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from enumsol.model.statuses import Conditions
-    from enumsol.selections.polytopes import Table
+    from enumsol.selections.solution import Table
     from enumsol.support.array_types import Codes, Floats, Integers, NDArray
 
 

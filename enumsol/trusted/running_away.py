@@ -31,11 +31,13 @@ from enumsol.arithmetic.balls import (
 from enumsol.trusted.status_rows import OPEN, SLIP_MINUS, SLIP_PLUS, STICK
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Iterator, Sequence
 
     from enumsol.condensation.dynamic import DynamicStiffness
     from enumsol.support.array_types import Floats, Mask
 
+    #: K or a slope of it, and a bound of how far K lies above a chord.
+    _End = tuple[Ball, Ball | None]
 
 #: Ways in which nodes slide or stay that are looked at for one range of mu: a file could ask for any number of them.
 MOST_WAYS = 20_000
@@ -144,24 +146,20 @@ class NoMotion:
     def _holds(self, stiffness: DynamicStiffness, motions: Motions) -> bool:
         if not 0 <= self.low < self.high or not self._admitted(motions):
             return False
-        known = self._ends(stiffness)
-        if known is None:
-            return False
-        (first, first_bend), (last, last_bend) = known
         kept = np.setdiff1d(np.arange(len(motions.signed)), self.stays)
         if not len(kept):
             return True
         plain = np.array_equal(self.weights, np.eye(len(motions.signed)))
         left = motions.leaning[:, kept] if plain else motions.leaning @ Ball.exact(self.weights[:, kept])
         right = motions.moves[:, kept]
+        acts = (motions.leaning.size > 0).astype(float) @ (self.weights[:, kept] != 0) + right.size > 0
+        # zero minus zero has no radius: large matrices stay sparse
         apart = left - right
-        for K, bend, N in zip((first, last), (first_bend, last_bend), self.products, strict=True):
-            Q = _across(left, K, right).symmetric - Ball.exact(N[np.ix_(kept, kept)]).symmetric
-            if bend is not None:
-                Q = Q - Ball.exact(np.array(0.25)) * _across(apart, bend, apart).symmetric
-            if not positive(Q):
-                return False
-        return True
+        forms = left, right, Ball(apart.mid, np.where(acts, apart.rad, 0.0))
+        return any(
+            all(_definite(forms, acts, end, N[np.ix_(kept, kept)]) for end, N in zip(ends, self.products, strict=True))
+            for ends in self._ends(stiffness)
+        )
 
     def _admitted(self, motions: Motions) -> bool:
         """True if the numbers have the signs that the theorem asks for."""
@@ -200,41 +198,44 @@ class NoMotion:
             and all(bool(np.all(N[pairs] >= 0)) and not np.any(N[~pairs]) for N in self.products)
         )
 
-    def _ends(self, stiffness: DynamicStiffness) -> tuple[tuple[Ball, Ball | None], ...] | None:
+    def _ends(self, stiffness: DynamicStiffness) -> Iterator[tuple[_End, _End]]:
         """At either end K or, for an infinite one, its slope, with a bound of how far K lies above the chord there."""
         low, high, beside = self.low, self.high, self.beside
-        K = stiffness.at(low)
-        if K is None:
-            return None
-        if beside is not None and not (beside < low or high < beside < np.inf):
-            return None
-        other = None if beside is None else stiffness.at(beside)
-        if beside is not None and other is None:
-            return None
+        K, other = stiffness.at(low), None if beside is None else stiffness.at(beside)
+        if K is None or (beside is not None and (other is None or not (beside < low or high < beside < np.inf))):
+            return
         if np.isinf(high):
-            if other is None or beside is None:
-                limit = stiffness.stiffest
-                return None if limit is None else ((K, None), (K, limit - K))
-            limit = stiffness.steepest
-            return (
-                None
-                if limit is None
-                else ((K, None), (limit, (K - other) * _ratio(1, Fraction(low) - Fraction(beside)) - limit))
-            )
+            slope = None
+            if other is not None and beside is not None:
+                slope = (K - other) * _ratio(1, Fraction(low) - Fraction(beside))
+            yield from self._without_end(stiffness, K, slope)
+            return
         end = stiffness.at(high)
         if end is None:
-            return None
+            return
         if other is None or beside is None:
-            return ((K, end - K), (end, None)) if stiffness.increases else None
-        if beside < low:
-            return (K, None), (
-                end,
-                K + (K - other) * _ratio(Fraction(high) - Fraction(low), Fraction(low) - Fraction(beside)) - end,
-            )
-        return (
-            K,
-            end - (other - end) * _ratio(Fraction(high) - Fraction(low), Fraction(beside) - Fraction(high)) - K,
-        ), (end, None)
+            if stiffness.increases:
+                yield (K, end - K), (end, None)
+        elif beside < low:
+            above = K + (K - other) * _ratio(Fraction(high) - Fraction(low), Fraction(low) - Fraction(beside)) - end
+            yield (K, None), (end, above)
+        else:
+            above = end - (other - end) * _ratio(Fraction(high) - Fraction(low), Fraction(beside) - Fraction(high)) - K
+            yield (K, above), (end, None)
+
+    @staticmethod
+    def _without_end(stiffness: DynamicStiffness, K: Ball, slope: Ball | None) -> Iterator[tuple[_End, _End]]:
+        """The ends of a range without end: rows that yield have a largest K, the others a smallest slope."""
+        yields, limit = stiffness.yields, stiffness.stiffest
+        if limit is None or not stiffness.increases:
+            return
+        # the square of a sum of two is at most twice the sum of their squares
+        share = Ball.exact(np.array(1.0 if len({*yields.tolist()}) == 1 else 2.0))
+        first = K, _among((limit - K) * share, yields)
+        if np.all(yields):
+            yield first, (Ball.exact(np.zeros_like(K.mid)), None)
+        elif slope is not None and (least := stiffness.steepest) is not None:
+            yield first, (least, _among((slope - least) * share, ~yields))
 
 
 @dataclass(frozen=True)
@@ -456,6 +457,36 @@ def _degree(K: Ball, motions: Motions, load: Floats) -> int | None:
     return total
 
 
+def _definite(forms: tuple[Ball, Ball, Ball], acts: Mask, end: _End, N: Floats) -> bool:
+    """True if left'K right - apart'E apart / 4 - N has a positive symmetric part, but for what K and N leave at zero.
+
+    Parameters
+    ----------
+    forms : left, right, apart, Balls (m, q)
+    acts : (m, q) bool array
+        Where left or right is not zero.
+    end : (K, E)
+        E is zero in rows in which K is.
+    N : (q, q) array
+    """
+    (left, right, apart), (K, bend) = forms, end
+    own = np.any(acts[np.any(K.size > 0, axis=1)], axis=0)
+    if np.any(N[~own]) or np.any(N[:, ~own]):
+        return False
+    if not np.any(own):
+        return True
+    Q = _across(left[:, own], K, right[:, own]).symmetric - Ball.exact(N[np.ix_(own, own)]).symmetric
+    if bend is not None and np.any(bend.size):
+        Q = Q - Ball.exact(np.array(0.25)) * _across(apart[:, own], bend, apart[:, own]).symmetric
+    return positive(Q)
+
+
+def _among(K: Ball, rows: Mask) -> Ball:
+    """K between some rows, zero elsewhere."""
+    own = np.outer(rows, rows)
+    return Ball(np.where(own, K.mid, 0.0), np.where(own, K.rad, 0.0))
+
+
 def _slope(motions: Motions, node: Touching, code: int) -> Ball:
     """T of a node that touches and begins to slip."""
     along, leaves = motions.moves[:, list(node.slides)], motions.moves[:, [node.leaves]]
@@ -515,16 +546,13 @@ def positive(Q: Ball) -> bool:
     return dense_eigenvalue_bound(Q.mid * scale) > float(upper_norm(Q.rad * scale + TINY)) * (1 + 2.0**-40)
 
 
-def everywhere(ranges: Sequence[tuple[float, float, Sequence[NoMotion]]]) -> bool:
-    """True if ranges (low, high, certificates that hold) leave no mu >= 0 and no way in which nodes slide or stay."""
-    reached = 0.0
-    for low, high, leaves in sorted(ranges, key=lambda item: item[0]):
-        if not low <= reached:
-            return False
+def left_open(leaves: Sequence[NoMotion]) -> tuple[float, float] | None:
+    """The first range of mu in which leaves, which hold, are not about every way; None if there is none."""
+    ends = sorted({0.0, np.inf, *(leaf.low for leaf in leaves), *(leaf.high for leaf in leaves)})
+    for low, high in itertools.pairwise(ends):
         if not covers([leaf for leaf in leaves if leaf.low <= low and high <= leaf.high]):
-            return False
-        reached = max(reached, high)
-    return reached == np.inf
+            return low, high
+    return None
 
 
 def covers(leaves: Sequence[NoMotion], most: int = MOST_WAYS) -> bool:

@@ -17,13 +17,13 @@ from refusals import refusal
 from enumsol import ContactProblem, branch_graph, enumerate_roots, gallery
 from enumsol.arithmetic.rationals import rational
 from enumsol.branches import known_selections, ways
+from enumsol.branches.elements import DEFECT, named
 from enumsol.branches.enclosed import following, tracing
 from enumsol.branches.enclosed.cutting import AlphaBox, ArcPart, ArcPartKind, Trace
 from enumsol.branches.enclosed.joining import join
 from enumsol.branches.gluing import glue
 from enumsol.branches.known_selections import KnownSelections
 from enumsol.branches.space import space_graph as cover
-from enumsol.branches.unfinished import DEFECT, named
 from enumsol.condensation.exact import ExactCondensed
 from enumsol.errors import IncompleteGraphError
 from enumsol.model.statuses import OPEN, SLIP_PLUS, STATUSES

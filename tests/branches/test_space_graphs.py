@@ -38,9 +38,8 @@ from enumsol.branches.space.pieces import runs_and_turns
 from enumsol.continuation.path_data import PathStatus
 from enumsol.search.space.curve_proposals import border_of_zeta, curve_point, placed, unplaced
 from enumsol.support.deadlines import TimeOverError, within
-from enumsol.trusted.space.curve_chains import CurveChain
-from enumsol.trusted.space.curve_events import CurveMotion
-from enumsol.trusted.space.curve_parts import Run, Turn, orders
+from enumsol.trusted.space.curve_parts import CurveMotion, Run, Turn, orders
+from enumsol.trusted.space.curve_runs import CurveChain
 from enumsol.trusted.space.sector_rows import OPEN, STICK
 from enumsol.trusted.space.solution_curve import SLIP, AlphaProblem
 

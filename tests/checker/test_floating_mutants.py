@@ -34,7 +34,7 @@ from enumsol.model.sectors import SECTORS, nearest
 from enumsol.search.solvers import Solvers
 from enumsol.trusted.exclusion import exclusion_margin
 from enumsol.trusted.space import sector_rows as sr
-from enumsol.trusted.space.resultants import is_unbalanced_in_space
+from enumsol.trusted.space.force_bound import is_unbalanced_in_space
 from enumsol.trusted.space.sector_margins import space_margin
 from enumsol.trusted.status_rows import FORBIDDEN, FREE, row_signs
 

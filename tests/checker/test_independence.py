@@ -26,9 +26,9 @@ CHECKERS = inside("checker", "verify", "plane_checker", "graph_checker", "histor
 CHECKERS.append("enumsol.checker.stability_checker")
 IN_SPACE = {
     *("enumsol.checker.space_checker", "enumsol.condensation.space_condensed", "enumsol.model.sectors"),
-    *inside("trusted.space", "resultants", "sector_margins", "sector_rows", "leaves", "boxed_solution"),
+    *inside("trusted.space", "sector_margins", "sector_rows", "leaves", "boxed_solution"),
     *inside("trusted.space", "natural_map", "krawczyk", "space_uniqueness", "turning"),
-    *inside("trusted.space", "leaf_conditions", "leaf_equations", "force_bound"),
+    *inside("trusted.space", "leaf_equations", "force_bound"),
 }
 #: The search: its rooms, and what it alone uses of rooms that it shares with the checkers.
 SEARCH = (
@@ -55,7 +55,6 @@ SHARED = {
     "trusted.arcs.only_branch": {"only_roots"},
     "trusted.arcs.selection_balls": None,
     "trusted.exclusion": {"Terms", "exclusion_margin"},
-    "trusted.joint_roots": {"JointRoot"},
     "trusted.floating_bounds": {"is_unbalanced", "motion_against", "motion_beside", "without_bound"},
     "trusted.arcs.many_digits": {"affordable", "ball_of", "precision"},
     "trusted.arcs.over_parts": None,
@@ -66,8 +65,7 @@ SHARED = {
     "trusted.reference": {"Reference"},
     "trusted.selection": None,
     "trusted.uniqueness": {*("ClosedSolution", "closed_solution", "numbers_of", "only_solution", "same_solution")},
-    "trusted.at_alpha": {"VerifiedSelection", "settled_selection", "solve_selection"},
-    "trusted.precise_at_alpha": {"PreciseAtAlpha"},
+    "trusted.at_alpha": {"JointRoot", "VerifiedSelection", "settled_selection", "solve_selection"},
     "trusted.motions_of_body": {
         *(
             "BodyMotions",
@@ -86,17 +84,17 @@ SHARED = {
     "trusted.space.sector_rows": None,
     "trusted.space.leaf_equations": {"with_free_bounds"},
     "trusted.space.leaves": None,
-    "trusted.space.resultants": None,
+    "trusted.space.force_bound": {"resultants", "unbounded"},
     "trusted.space.turning": {"turned_by"},
     "trusted.space.boxed_solution": {
         *("Box", "BoxedSolution", "BoxProblem", "apart_in_boxes", "is_inside", "solution_in_box")
     },
     "trusted.space.krawczyk": {"Contraction", "NaturalMap", "Step"},
     "trusted.space.solution_curve": None,
-    "trusted.space.curve_chains": None,
-    "trusted.space.curve_events": None,
     "trusted.space.curve_parts": None,
-    "trusted.space.curve_runs": {"CurveParts", "KnownCurve", "Run"},
+    "trusted.space.curve_runs": {
+        *("CurveChain", "CurveLink", "CurveParts", "KnownCurve", "LinkRange", "apart", "goes_on", "link_between")
+    },
     "trusted.space.pieces": {"AlphaPiece", "LeafArc", "lie_along"},
     "trusted.space.space_uniqueness": {
         *("LeafReference", "LooseSolution", "OnlySolution", "PieceWeights"),

@@ -67,6 +67,13 @@ def with_unit_mass(name, alpha):
     return problem, alpha, np.eye(problem.n)
 
 
+def partly_massless(seed, without):
+    """Contact nodes of which some have mass and others do not, or have it along their tangents only."""
+    problem, alpha, mass = strongly_coupled(seed)
+    mass[np.ix_(without, without)] = 0.0
+    return problem, alpha, mass
+
+
 PROBLEMS = {
     "taper-8": lambda: gallery_problem("taper-8", 0.2),
     "wedge-8-5": lambda: gallery_problem("wedge-8-5", 3.0),
@@ -74,6 +81,9 @@ PROBLEMS = {
     "two bodies": lambda: (gallery.chain(2), 5.0, np.eye(gallery.chain(2).n)),
     **{f"floating {seed}": functools.partial(floating_in_the_plane, seed) for seed in (1, 3, 5)},
     **{f"coupled {seed}": functools.partial(strongly_coupled, seed) for seed in range(4)},
+    "a node without mass": functools.partial(partly_massless, 1, [0, 3]),
+    "mass along a tangent": functools.partial(partly_massless, 2, [0, 1, 2]),
+    "no node with mass along its normal, one without any": functools.partial(partly_massless, 3, [0, 1, 2, 4]),
     **{f"in space {seed}": functools.partial(in_space, seed) for seed in (0, 2)},
     "floating in space": functools.partial(floating, 105),
 }
@@ -131,6 +141,13 @@ def test_honest_proofs(name):
 def test_honest_proofs_by_the_judge(name):
     verdicts = judged(name, known(name)[3])
     assert verdicts == [found.verdict for found in known(name)[2].verdicts]
+
+
+def test_a_proof_takes_what_verdicts_found(monkeypatch):
+    roots = enumsol.enumerate_roots(gallery.get("taper-8").build(), 0.2)
+    found = roots.stability()
+    monkeypatch.setattr(search.StabilitySearch, "run", None)
+    assert verify(roots[0].problem, roots.stability_proof()).verdicts == tuple(own.verdict for own in found)
 
 
 def test_what_is_verified_is_not_little():

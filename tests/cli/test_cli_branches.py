@@ -213,7 +213,7 @@ def test_bad_calls_get_one_sentence(capsys, tmp_path, monkeypatch, arguments, pa
 
 def test_without_matplotlib_the_extra_is_named(capsys, monkeypatch, tmp_path):
     find = importlib.util.find_spec
-    monkeypatch.setattr("enumsol.cli.files.find_spec", lambda name: None if name == "matplotlib" else find(name))
+    monkeypatch.setattr("enumsol.cli.options.find_spec", lambda name: None if name == "matplotlib" else find(name))
     answer = run(capsys, *GRAPH, "--plot", tmp_path / "graph.png")
     assert_refused(*answer, "--plot needs matplotlib", 'pip install "enumsol[plots]"')
 

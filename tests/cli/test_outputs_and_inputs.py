@@ -9,7 +9,7 @@ from command_line import assert_refused, call, run
 
 import enumsol
 from enumsol import gallery
-from enumsol.cli.files import check_files
+from enumsol.cli.options import check_files
 
 MESHES = Path(__file__).parents[1] / "fem" / "meshes"
 BODY = ("--young", 2.5, "--poisson", 0.25, "--contact", "floor", "--clamp", "lid", "--friction", 0.3, "--alpha", 0)
@@ -106,7 +106,7 @@ def test_files_for_paraview_are_several(place, capsys):
 def test_letters_of_another_case(tmp_path, monkeypatch):
     given = [("--json", str(tmp_path / "r.json")), ("--csv", str(tmp_path / "R.json"))]
     check_files([], given)
-    monkeypatch.setattr("enumsol.cli.files._folds", lambda folder: True)
+    monkeypatch.setattr("enumsol.cli.options._folds", lambda folder: True)
     with pytest.raises(enumsol.InvalidArgumentError, match="the same file"):
         check_files([], given)
 
@@ -143,10 +143,10 @@ def test_a_file_of_another_kind_is_not_replaced(place, capsys, command, option, 
 
 
 def test_every_command_checks_its_files():
-    from enumsol.cli import files
     from enumsol.cli.app import app
+    from enumsol.cli.options import FileCommand
 
     groups = [app, *(group.typer_instance for group in app.registered_groups)]
     commands = [command for group in groups for command in group.registered_commands]
     assert len(commands) >= 15
-    assert all(command.cls is files.FileCommand for command in commands)
+    assert all(command.cls is FileCommand for command in commands)

@@ -12,7 +12,7 @@ from refusals import bad_argument, refusal
 
 import enumsol
 from enumsol.continuation import SmoothPath, follow, newton
-from enumsol.continuation.disc_equation import SLIP
+from enumsol.continuation.condensed_equation import SLIP
 from enumsol.continuation.start import equation_on
 from enumsol.model.statuses import OPEN, SLIP_MINUS, SLIP_PLUS, STICK
 

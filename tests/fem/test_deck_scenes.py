@@ -79,6 +79,16 @@ RIGHT = {
     "contact of a surface of nodes": (deck(mesh=MESH + "*SURFACE, NAME=POINTS, TYPE=NODE\n11\n12\n13\n", contact=CONTACT.replace("UNDER", "POINTS")), {}),
     "gaps that are closed": (deck(mesh=LIFTED, contact=CONTACT.replace("DRY\nUNDER", "DRY, ADJUST=0.01\nUNDER")), {}),
     "a press fit that is taken away": (deck(mesh=LIFTED.replace("1.004", "0.996"), contact=CONTACT.replace("DRY\nUNDER", "DRY, ADJUST=0.\nUNDER")), {}),
+    "named surfaces of all contacts": (deck(contact="*SURFACE INTERACTION, NAME=DRY\n*FRICTION\n0.3\n*CONTACT\n*CONTACT INCLUSIONS\nUNDER, ON\n*CONTACT PROPERTY ASSIGNMENT\n , , DRY\n"), {}),
+    "properties of one of all contacts": (deck(mesh=LIFTED.replace("1.004", "0.996"), contact="*CONTACT\n*CONTACT INCLUSIONS\nUNDER, ON\n*CONTACT PROPERTY ASSIGNMENT\nON, UNDER, DRY\n*SURFACE INTERACTION, NAME=DRY\n*FRICTION\n0.3\n"), {}),
+    "all contacts without friction": (deck(contact="*CONTACT\n*CONTACT INCLUSIONS\nUNDER, ON\n"), {"friction": 0.0}),
+    "gaps of a set that are closed": (deck(mesh=LIFTED + "*NSET, NSET=LOW\n11, 12, 13\n", contact=CONTACT.replace("DRY\nUNDER", "DRY, ADJUST=LOW\nUNDER")), {}),
+    "a press fit that is taken up in the step": (deck(mesh=LIFTED.replace("1.004", "1."), contact=CONTACT + "*CLEARANCE, MASTER=ON, SLAVE=UNDER, VALUE=-0.004\n",
+        steps=step(DOWN + PUSH + "*Contact Interference, shrink\nUNDER, ON\n")), {"pairs": [("UNDER", "ON", -0.004)]}),
+    "dampers": (deck(contact=CONTACT.replace("*CONTACT PAIR", "*CONTACT DAMPING, DEFINITION=DAMPING COEFFICIENT\n1.\n*CONTACT PAIR")), {}),
+    "a behavior that changes": (deck(steps=step("*CHANGE SURFACE BEHAVIOR, INTERACTION=DRY\n*SURFACE BEHAVIOR, PRESSURE-OVERCLOSURE=LINEAR\n1E6\n" + DOWN + PUSH)), {}),
+    "a pair that is taken out and put back": (deck(steps=step("*MODEL CHANGE, TYPE=CONTACT PAIR, REMOVE\nUNDER, ON\n*MODEL CHANGE, TYPE=CONTACT PAIR, ADD\nUNDER, ON\n" + DOWN + PUSH)), {}),
+    "one of two pairs that is taken out": (deck(contact=CONTACT + "*CONTACT PAIR, INTERACTION=DRY\nRIGHT, ABOVE\n", steps=step("*Model change, type=CONTACT PAIR, remove\nRIGHT, ABOVE\n" + DOWN + PUSH)), {}),
     "friction that changes in the step": (deck(steps=step("*CHANGE FRICTION, INTERACTION=DRY\n*FRICTION\n0.1\n" + DOWN + PUSH)), {"friction": 0.1}),
     "friction that changes to none": (deck(steps=step("*CHANGE FRICTION, INTERACTION=DRY\n*FRICTION\n0.\n" + DOWN + PUSH)), {"friction": 0.0}),
 }  # fmt: skip
@@ -104,7 +114,7 @@ WRONG = {
     "a step in a step": (deck(steps="*STEP\n*STATIC\n*STEP\n"), r"line \d+: \*STEP begins before the step before it"),
     "a step of no kind": (deck(steps="*STEP\n*END STEP\n"), r"line \d+: \*END STEP ends step 1, which has no \*STATIC"),
     "large displacements": (deck(steps=step(DOWN, ", NLGEOM")), r"line \d+: \*STEP has NLGEOM"),
-    "vibrations about a state": (deck(steps=step(DOWN, ", PERTURBATION")), r"line \d+: \*STEP has PERTURBATION"),
+    "vibrations about a state": (deck(steps=step(DOWN, ", PERTURBATION")), r"line \d+: \*STATIC stands in a step with PERTURBATION"),
     "dynamics": (deck(steps="*STEP\n*DYNAMIC\n1., 1.\n*END STEP\n"), r"line \d+: \*DYNAMIC"),
     "plasticity": (deck(materials=MATERIALS.replace("*DENSITY\n2.", "*PLASTIC\n1., 0.")), r"line \d+: \*PLASTIC .*--ignore PLASTIC"),
     "rubber": (deck(materials=MATERIALS.replace("*DENSITY\n2.", "*HYPERELASTIC, NEO HOOKE\n1., 0.1")), r"line \d+: \*HYPERELASTIC"),
@@ -139,7 +149,23 @@ WRONG = {
     "friction in a step": (deck(steps=step("*FRICTION\n0.1\n")), r"line \d+: \*FRICTION stands in a step without \*CHANGE FRICTION"),
     "another interaction changes": (deck(steps=step("*CHANGE FRICTION, INTERACTION=WET\n*FRICTION\n0.1\n")), r"line \d+: \*CHANGE FRICTION names the interaction WET"),
     "surfaces that cannot part": (deck(contact=CONTACT.replace("*FRICTION", "*SURFACE BEHAVIOR, NO SEPARATION\n*FRICTION")), r"line \d+: \*SURFACE BEHAVIOR has NO SEPARATION"),
-    "an adjustment of a set": (deck(contact=CONTACT.replace("DRY\nUNDER", "DRY, ADJUST=BOTTOM\nUNDER")), r"line \d+: \*CONTACT PAIR has ADJUST=BOTTOM; expected the distance up to which nodes are moved"),
+    "large displacements, and how to do without": (deck(steps=step(DOWN, ", NLGEOM=YES")), r"line \d+: \*STEP has NLGEOM.*--ignore NLGEOM \(in Python"),
+    "a frequency analysis": (deck(steps=PRESSED + "*STEP\n*FREQUENCY\n5\n*END STEP\n"), r"line \d+: \*FREQUENCY is another analysis than \*STATIC.*--ignore FREQUENCY"),
+    "a surface of nodes that are no facets": (deck(mesh=MESH + "*SURFACE, NAME=POINTS, TYPE=NODE\n11\n13\n", contact=CONTACT.replace("UNDER", "POINTS")), r"line \d+: \*SURFACE POINTS has node 11, which belongs to no facet"),
+    "a surface of nodes of no body": (deck(mesh=MESH + "*NODE\n99, 9., 9.\n*SURFACE, NAME=POINTS, TYPE=NODE\n99\n", contact=CONTACT.replace("UNDER", "POINTS")), r"line \d+: \*SURFACE POINTS has no node of a body"),
+    "elements that are taken out": (deck(steps=step("*MODEL CHANGE, TYPE=ELEMENT, REMOVE\n11\n")), r"line \d+: \*MODEL CHANGE changes other things"),
+    "a pair that is none is taken out": (deck(steps=step("*MODEL CHANGE, TYPE=CONTACT PAIR, REMOVE\nON, UNDER\n")), r"line \d+: \*MODEL CHANGE names the pair ON:UNDER; .* UNDER:ON"),
+    "all pairs are taken out": (deck(steps=step("*MODEL CHANGE, TYPE=CONTACT PAIR, REMOVE\nUNDER, ON\n")), r"line \d+: no pair is in contact in step 1"),
+    "an interference of no pair": (deck(steps=step("*CONTACT INTERFERENCE\nUNDER, OF\n")), r"line \d+: \*CONTACT INTERFERENCE names the pair UNDER:OF"),
+    "an interference by an amplitude": (deck(steps=step("*CONTACT INTERFERENCE, AMPLITUDE=A\nUNDER, ON\n")), r"line \d+: \*CONTACT INTERFERENCE has the option AMPLITUDE"),
+    "a behavior of nothing changes": (deck(steps=step("*CHANGE SURFACE BEHAVIOR, INTERACTION=WET\n")), r"line \d+: \*CHANGE SURFACE BEHAVIOR names the interaction WET"),
+    "a behavior in a step": (deck(steps=step("*SURFACE BEHAVIOR, PRESSURE-OVERCLOSURE=HARD\n")), r"line \d+: \*SURFACE BEHAVIOR stands in a step without \*CHANGE SURFACE BEHAVIOR"),
+    "all that is outside": (deck(contact="*CONTACT\n*CONTACT INCLUSIONS, ALL EXTERIOR\n"), r"line \d+: \*CONTACT INCLUSIONS has ALL EXTERIOR; expected the surfaces"),
+    "a surface with nothing": (deck(contact="*CONTACT\n*CONTACT INCLUSIONS\nUNDER,\n"), r"line \d+: \*CONTACT INCLUSIONS has UNDER:; expected two named surfaces"),
+    "inclusions in nothing": (deck(contact="*CONTACT INCLUSIONS\nUNDER, ON\n"), r"line \d+: \*CONTACT INCLUSIONS has UNDER:ON; expected two named surfaces behind \*CONTACT"),
+    "properties of no pair": (deck(contact="*CONTACT\n*CONTACT INCLUSIONS\nUNDER, ON\n*CONTACT PROPERTY ASSIGNMENT\nUNDER, ABOVE, DRY\n"), r"line \d+: \*CONTACT PROPERTY ASSIGNMENT gives DRY to UNDER:ABOVE"),
+    "all contacts of a step": (deck(steps=step("*CONTACT\n")), r"line \d+: \*CONTACT stands in a step"),
+    "an adjustment of no set": (deck(contact=CONTACT.replace("DRY\nUNDER", "DRY, ADJUST=BOTTUM\nUNDER")), r"line \d+: node 'BOTTUM' is not in the deck"),
     "a clearance of no pair": (deck(contact=CONTACT + "*CLEARANCE, SLAVE=ON, MASTER=UNDER, VALUE=0.1\n"), r"line \d+: \*CLEARANCE names the pair ON:UNDER; .* UNDER:ON"),
     "a clearance of no size": (deck(contact=CONTACT + "*CLEARANCE, SLAVE=UNDER, MASTER=ON\n"), r"line \d+: \*CLEARANCE has no VALUE"),
     "contact in a step": (deck(steps=step("*CONTACT PAIR, INTERACTION=DRY\nUNDER, ON\n")), r"line \d+: \*CONTACT PAIR stands in a step"),
@@ -174,6 +200,14 @@ def test_what_is_ignored_is_said(read):
     assert_same(model.problem(), by_hand(density=None))
     assert "*PLASTIC              not used, as you say" in str(model)
     assert "NLGEOM is ignored: displacements are small" in str(model)
+
+
+def test_the_step_of_an_analysis_that_is_ignored_is_left_out_as_a_whole(read):
+    other = "*STEP, PERTURBATION\n*FREQUENCY\n5\n*BOUNDARY\nTOP, 2, 2\n*END STEP\n"
+    model = read(deck(steps=PRESSED + other), ignore=["FREQUENCY"])
+    assert model.step_count == 1
+    assert "left out as a whole" in str(model)
+    assert_same(model.problem(), by_hand())
 
 
 def test_the_account_names_every_card_with_its_line(read):
@@ -270,6 +304,23 @@ def test_steps_that_change_more_than_loads_are_refused(read, cards, what):
     cards = cards if "NEW" in cards else cards.replace("BOTTOM", "LOWEST")
     with pytest.raises(enumsol.InvalidProblemError, match=rf"line \d+: step 2 changes {what}"):
         read(deck(mesh=mesh, held=held, steps=PRESSED + step(cards))).steps()
+
+
+def test_steps_with_other_pairs_in_contact_are_no_history(read):
+    """As many rows in both, of the nodes of the other body in the second."""
+    out, back = (f"*MODEL CHANGE, TYPE=CONTACT PAIR, {word}\n" for word in ("REMOVE", "ADD"))
+    first = step(out + "ON, UNDER\n" + DOWN + PUSH)
+    second = step(out + "UNDER, ON\n" + back + "ON, UNDER\n")
+    contact = CONTACT + "*CONTACT PAIR, INTERACTION=DRY\nON, UNDER\n"
+    plain = read(deck(contact=contact, steps=first + second))  # nodes that face each other: the same laws
+    assert_same(plain.problem(1), by_hand())
+    assert_same(plain.problem(2), by_hand(pairs=[("ON", "UNDER")]))
+    assert len(plain.steps()) == 2
+    mesh = MESH.replace("2, 1., 0.\n", "2, 1.2, 0.\n", 1).replace("5, 1., 1.\n", "5, 1.2, 1.\n", 1)
+    model = read(deck(mesh=mesh, contact=contact, steps=first + second))
+    assert model.problem(1).p == model.problem(2).p
+    with pytest.raises(enumsol.InvalidProblemError, match=r"line \d+: step 2 changes which pairs are in contact"):
+        model.steps()
 
 
 def test_of_several_steps_one_is_named(read):

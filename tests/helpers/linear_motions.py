@@ -18,8 +18,11 @@ def random_motion(rng, touching=False, massless=False):
     Y = rng.normal(size=(n, n))
     M = [np.eye(n), np.diag(10.0 ** rng.uniform(-1, 1, n)), Y @ Y.T + 0.1 * np.eye(n)][rng.integers(3)]
     if massless:
-        # the contact rows alone have mass, or all but some that they do not touch, or none of them
-        still = np.arange(2 * p, n) if rng.random() < 0.5 else np.arange(2 * p)
+        # the contact rows alone have mass, none of them, some nodes, or others along their tangents only
+        some, nodes = rng.random(p) < 0.5, np.arange(p)
+        still = [np.arange(2 * p, n), np.arange(2 * p), np.append(nodes[some], p + nodes[some]), nodes[some]][
+            rng.integers(4)
+        ]
         M[still] = M[:, still] = 0.0
     F = rng.choice([0.0, 0.3, 0.7, 1.5, 3.0], size=p, p=[0.05, 0.25, 0.25, 0.25, 0.2])
     names = ["open", "stuck", "limit", "limit", *(["touching"] if touching else [])]

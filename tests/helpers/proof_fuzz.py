@@ -2,9 +2,12 @@
 
 import base64
 import json
+import re
 import struct
 import zlib
+from fractions import Fraction
 from functools import reduce
+from math import isfinite
 from operator import getitem
 
 from proof_tools import MAGIC, copied, multipliers, put, sealed, with_multipliers
@@ -253,3 +256,66 @@ _MUTATIONS = {
     **{"file": _file, "stream": _stream, "characters": _characters, "order": _order},
     **{"field": _field, "field again": _field, "nudge": _nudge, "numbers": _numbers, "bomb": _bomb},
 }
+
+
+# -- one number after the other ----------------------------------------------------------------------------------------
+
+
+def each_number(records):
+    """The records with one number that is another one: (place, record).
+
+    Numbers, fractions, codes, and rows and multipliers in base64; others are of other signs and sizes, zero, very
+    near, repeated or left out.
+    """
+    p = records[0]["p"]
+    for place, record in enumerate(records):
+        for path in _places(record):
+            for new in _others(reduce(getitem, path, record), record, path):
+                yield place, put([record], (0, *path), new)[0]
+        at = 2 if isinstance(record, list) and record[0] in "xf" and records[0].get("kind") == "graph" else 1
+        for rows, values in _other_multipliers(record, at, p):
+            packed = with_multipliers(["x", "", ""], rows, values)[1:]
+            yield place, [*record[:at], *packed, *record[at + 2 :]]
+
+
+def _others(old, record, path):
+    """Other values of a number or a text that stands for one."""
+    if type(old) is int:
+        beside = reduce(getitem, path[:-1], record) if path else []
+        found = {*range(9), old - 1, old + 1, -old, 10**9, 2**31, 2**63}
+        found |= {x for x in beside if type(x) is int} if isinstance(beside, list) else set()
+        yield from sorted(found - {old})
+    elif type(old) is float:
+        yield from (x for x in _sizes(old) if x != old and isfinite(x))
+    elif isinstance(old, str) and re.fullmatch(r"-?[0-9a-f]{1,200}(/[0-9a-f]{1,200})?", old):
+        base = 16 if isinstance(record, list) and record[0] == "D" else 10
+        if base == 10 and not re.fullmatch(r"[-0-9/]+", old):
+            return  # a fingerprint
+        value = Fraction(*(int(part, base) for part in old.split("/")))
+        others = (-value, 2 * value, value / 2, value + 1, value + Fraction(1, 10**30), Fraction(0))
+        yield from (_fraction(x, base, "/" in old) for x in others if x != value)
+        yield from (old[:i] + code + old[i + 1 :] for i in range(min(len(old), 6)) for code in "0123456" if base == 10)
+
+
+def _sizes(x):
+    return (-x, 0.0, x * (1 + 1e-9), x / 2, 2 * x, 1e3 * x, 1e-3 * x, x + 1.0, x - 1.0, 1e6, 1e300, -1e300, 5e-324)
+
+
+def _fraction(value, base, slash):
+    sign, above = "-" if value < 0 else "", abs(value.numerator)
+    digits = f"{above:x}/{value.denominator:x}" if base == 16 else f"{above}/{value.denominator}"
+    return sign + (digits if slash or value.denominator > 1 else str(above))
+
+
+def _other_multipliers(record, at, p):
+    """Other rows and multipliers in the place of those of a record, if it has some in base64."""
+    if not isinstance(record, list) or record[0] not in ("x", "f") or not isinstance(record[at], str):
+        return
+    rows, values = multipliers(["x", *record[at : at + 2]])
+    for j, (row, value) in enumerate(zip(rows, values, strict=True)):
+        for other in (*_sizes(value), float("inf"), float("nan")):
+            yield rows, [*values[:j], other, *values[j + 1 :]]
+        for other in {*range(7 * p + 1), 2**32 - 1} - {row}:
+            yield [*rows[:j], other, *rows[j + 1 :]], values
+        yield [*rows, row], [*values, value]
+        yield rows[:j] + rows[j + 1 :], values[:j] + values[j + 1 :]

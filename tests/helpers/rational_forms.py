@@ -77,11 +77,13 @@ def multipliers(rows, values):
 @lru_cache(maxsize=16)
 def fingerprint(problem):
     """[3.4]"""
-    free = problem.rigid_modes is not None
-    digest = hashlib.sha256(b"enumsol problem 1" + (b", held by nothing" if free else b""))
+    free, ball = problem.rigid_modes is not None, problem.offset_radius is not None
+    digest = hashlib.sha256(
+        b"enumsol problem 1" + (b", from a ball" if ball else b"") + (b", held by nothing" if free else b"")
+    )
 
     def add(values, kind):
-        digest.update(np.asarray(values).astype(kind).tobytes() + b"|")
+        digest.update((np.asarray(values).astype(kind) + 0).tobytes() + b"|")
 
     add([problem.n, problem.p], "<i8")
     for matrix in (problem.A, problem.Bn, problem.Bt):
@@ -93,6 +95,8 @@ def fingerprint(problem):
     slope = np.zeros(problem.n) if problem.load_slope is None else problem.load_slope
     for vector in (problem.f, problem.gap, *problem.affine_friction, slope, problem.slip_offset):
         add(vector, "<f8")
+    if ball:
+        add(problem.offset_radius, "<f8")
     if free:
         add(problem.rigid_modes.ravel(), "<f8")
         add([problem.rigid_reach], "<f8")

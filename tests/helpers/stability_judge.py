@@ -204,12 +204,22 @@ class Part:
 
     @cached_property
     def far(self):
-        """K for large mu: its slope, and None; or None, and a bound of it."""
+        """The least slope of K, zero in rows that yield, and its bound in these, zero in the others."""
         own = self.massive
         rest = np.setdiff1d(np.arange(len(self.A)), own)
-        if not np.any(self.B[:, rest]):
-            return bordered(balls(self.M[np.ix_(own, own)]), self.B[:, own]), None
-        return None, bordered(balls(self.A[np.ix_(rest, rest)]), self.B[:, rest])
+        return [
+            placed(balls(matrix[np.ix_(dofs, dofs)]), self.B[np.ix_(rows, dofs)], rows, len(self.B))
+            for matrix, dofs, rows in ((self.M, own, self.firm), (self.A, rest, self.yields))
+        ]
+
+    @cached_property
+    def yields(self):
+        """Rows that act on a degree of freedom without mass."""
+        return np.flatnonzero(np.any(self.B[:, np.setdiff1d(np.arange(len(self.A)), self.massive)], axis=1)).tolist()
+
+    @property
+    def firm(self):
+        return [row for row in range(len(self.B)) if row not in self.yields]
 
     def grows(self, low, high, slides):
         """(15.5) The motion itself, where the determinant vanishes."""
@@ -277,13 +287,17 @@ class Part:
             return
         L = columns(self.T * arb_mat(weights), kept)
         R = columns(self.R, kept)
-        first, last = self.bounds(a, b, c)
-        for (K, E), N in zip((first, last), products, strict=True):
+        for at, ((K, E), N) in enumerate(zip(self.bounds(a, b, c), products, strict=True)):
             Q = L.transpose() * K * R
             Q = Q - arb_mat([[N[i][j] for j in kept] for i in kept])
             if E is not None:
                 Q = Q - (L - R).transpose() * E * (L - R) * arb(0.25)
-            need(is_definite((Q + Q.transpose()) * arb(0.5)), "a form is not definite")
+            Q, own = (Q + Q.transpose()) * arb(0.5), list(range(len(kept)))
+            if b is None and at:
+                own = [j for j in own if any(L[i, j] != 0 or R[i, j] != 0 for i in self.firm)]
+                others = [j for k, j in enumerate(kept) if k not in own]
+                need(not any(N[i][j] != 0 or N[j][i] != 0 for i in kept for j in others), "a product without a slope")
+            need(not own or is_definite(columns(columns(Q, own).transpose(), own)), "a form is not definite")
 
     def bounds(self, a, b, c):
         """(15.7), (15.8) K, or its slope, and E at both ends."""
@@ -293,12 +307,14 @@ class Part:
             need(c >= 0 or is_definite(balls(self.A) + balls(self.M) * c), "A + c M is not definite")
             beside = self.at(c)
         if b is None:
-            slope, bound = self.far
-            if c is None:
-                need(bound is not None, "no bound of K")
-                return (first, None), (first, bound - first)
-            need(slope is not None, "no slope of K")
-            return (first, None), (slope, (first - beside) * (1 / (a - c)) - slope)
+            slope, most = self.far
+            need(c is not None or not self.firm, "no slope of K")
+            share = 2 if self.firm and self.yields else 1
+            above = slope if c is None else (first - beside) * (1 / (a - c)) - slope
+            return (
+                (first, among(most - first, self.yields) * arb(share)),
+                (slope, among(above, self.firm) * arb(share)),
+            )
         last = self.at(b)
         if c is None:
             need(self.massive is not None, "no mass")
@@ -319,6 +335,20 @@ def bordered(A, B):
             whole[n + k, j] = whole[j, n + k] = arb(value)
     inverse = whole.inv()
     return arb_mat([[-inverse[n + i, n + j] for j in range(m)] for i in range(m)])
+
+
+def placed(A, B, rows, size):
+    """(B A^-1 B')^-1 between some rows, zero elsewhere."""
+    whole = arb_mat(size, size)
+    if rows:
+        part = bordered(A, B)
+        for (i, row), (j, column) in product(enumerate(rows), repeat=2):
+            whole[row, column] = part[i, j]
+    return whole
+
+
+def among(K, rows):
+    return arb_mat([[K[i, j] if {i, j} <= {*rows} else 0 for j in range(K.ncols())] for i in range(K.nrows())])
 
 
 def columns(matrix, kept):

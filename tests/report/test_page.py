@@ -17,9 +17,9 @@ import enumsol
 from enumsol import MissingDependencyError, branch_graph, enumerate_roots, fem, gallery, histories, write_report
 from enumsol.model.cells import boundary_facets
 from enumsol.model.shapes import body_shape
-from enumsol.report import body as bodies, graph_page as content, history_page
-from enumsol.report.body import body_record
+from enumsol.report import graph_page as content, history_page, parts as bodies
 from enumsol.report.graph_page import rounded_list, slider_alphas
+from enumsol.report.parts import body_record
 from enumsol.support.plotting import new_figure
 
 pytest.importorskip("plotly")

@@ -16,7 +16,7 @@ import enumsol
 from enumsol import MissingDependencyError, enumerate_roots, fem, gallery, write_report
 from enumsol.fem.bases import von_mises
 from enumsol.model.shapes import body_shape, slip_directions
-from enumsol.report import body, roots_page
+from enumsol.report import parts, roots_page
 
 pytest.importorskip("plotly")
 HOSTILE = '</script><script>document.title = "broken"</script>'
@@ -175,15 +175,15 @@ def test_pages_are_small_and_ask_the_network_for_nothing(pages, monkeypatch):
 
 def test_large_meshes_are_drawn_in_part_or_not_at_all(found, monkeypatch):
     count = 3 * len(roots_page.roots_content(found["wedge"])["body"]["points"])
-    monkeypatch.setattr(body, "_MOST_NUMBERS", 4 * count)
+    monkeypatch.setattr(parts, "_MOST_NUMBERS", 4 * count)
     part = roots_page.roots_content(found["wedge"])
     assert ["u" in record for record in part["roots"]] == [True] * 3 + [False] * 6
     assert part["no_body"] == "The bodies of the first 3 roots are drawn: the page holds no more"
-    monkeypatch.setattr(body, "_MOST_NUMBERS", count)
+    monkeypatch.setattr(parts, "_MOST_NUMBERS", count)
     assert roots_page.roots_content(found["wedge"])["no_body"].startswith("The mesh is too large to draw: ")
     plane = found["plane"]
     nodes = len(plane[0].problem.mesh.points)
-    monkeypatch.setattr(body, "_MOST_NUMBERS", 2 * nodes * (len(plane) + 1) - 1)
+    monkeypatch.setattr(parts, "_MOST_NUMBERS", 2 * nodes * (len(plane) + 1) - 1)
     boundary = roots_page.roots_content(plane)["body"]
     assert boundary["cells"] is None
     assert len(boundary["points"]) == len(boundary["lines"]) < nodes

@@ -125,7 +125,7 @@ def test_bodies_with_cells_of_two_kinds(kind, tmp_path):
     """Pictures and files; the page draws a large body by the edges of its boundary."""
     import meshio
 
-    from enumsol.report.body import body_record, boundary_edges
+    from enumsol.report.parts import body_record, boundary_edges
 
     mesh, where = grid(3, 2, kind), {"contact": "bottom", "clamp": "left", "load": {"top": (0.1, -0.3)}}
     problem = fem.mesh_problem(mesh, young=2, poisson=0.3, friction=0.4, **where)

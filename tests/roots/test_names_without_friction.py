@@ -9,7 +9,7 @@ from complete import whole_graph
 from oracles import NAMES
 
 from enumsol import ContactProblem, ContactStatus, enumerate_roots
-from enumsol.roots import linearisation
+from enumsol.roots import local_branch
 
 SLIPS = {0: {"stick", "slip+", "slip-"}, 1: {"slip+"}, -1: {"slip-"}}
 
@@ -75,12 +75,12 @@ def test_a_slip_that_underflows_still_has_its_sign():
 
 def test_a_sign_that_nothing_decides_leaves_all_three_names(monkeypatch):
     # of a body too large for rationals, with an enclosure of u_t that holds zero
-    monkeypatch.setattr("enumsol.roots.linearisation.EXACT_DOF_LIMIT", 3)
+    monkeypatch.setattr("enumsol.roots.local_branch.EXACT_DOF_LIMIT", 3)
     problem = diagonal_problem([1.0, 3.0, 1.0, 3.0], [1.0, 0.0, 1.0, 0.5])
-    signs = linearisation.SlipSigns(problem, 0.0, (4, 4), (None, 1))
+    signs = local_branch.SlipSigns(problem, 0.0, (4, 4), (None, 1))
     assert signs.sign(0) is None
     for node in (0, 1):
-        assert {status.value for status in linearisation.slip_names(signs.sign(node))} == SLIPS[node]
+        assert {status.value for status in local_branch.slip_names(signs.sign(node))} == SLIPS[node]
 
 
 def test_branch_graphs_name_such_nodes_exactly():

@@ -13,7 +13,7 @@ from enumsol.arithmetic.balls import Ball
 from enumsol.branches.space import chains
 from enumsol.branches.space.chains import chain_through
 from enumsol.search.space.curve_proposals import curve_around, curve_point
-from enumsol.trusted.space.curve_chains import CurveChain, apart, link_between
+from enumsol.trusted.space.curve_runs import CurveChain, apart, link_between
 from enumsol.trusted.space.solution_curve import AlphaProblem, lies_in
 
 

@@ -16,7 +16,7 @@ from enumsol.branches.space.space_graph import ByCurves
 from enumsol.condensation.space_condensed import AlphaSpace
 from enumsol.search.space.piece_certificates import ExaminedPiece, runs_over
 from enumsol.trusted.space import curve_runs
-from enumsol.trusted.space.curve_runs import CurveParts, KnownCurve, Run
+from enumsol.trusted.space.curve_runs import CurveParts, KnownCurve, LinkRange
 from enumsol.trusted.space.pieces import AlphaPiece
 from enumsol.trusted.space.sector_rows import CONTACT, OPEN, STICK, UNDECIDED
 from enumsol.trusted.space.solution_curve import AlphaProblem, CurveBox, SolutionCurve
@@ -102,7 +102,7 @@ def test_parts_are_as_many_as_the_links_that_come_to_a_piece_ask_for(monkeypatch
     _, (known, *_) = known_curves(1, 1)
     low, high = PIECES[1]
     (run,) = runs_over(known, low, high)
-    whole = Run(1, len(known.chain.links) - 1)
+    whole = LinkRange(1, len(known.chain.links) - 1)
     assert run.first == run.last < whole.last
     several, one = known.over(whole, low, high), known.over(run, low, high)
     assert 64 <= len(one.links) < 128
@@ -154,7 +154,7 @@ def test_numbers_that_make_no_sense_are_refused():
     # another piece, no links, links in another order
     assert not piece_over(cover, low, Fraction(3, 2)).lies_on(known, run, codes, numbers)
     count = len(known.chain.links)
-    for wrong in (Run(-1, run.last), Run(run.first, count), Run(run.last + 1, run.last)):
+    for wrong in (LinkRange(-1, run.last), LinkRange(run.first, count), LinkRange(run.last + 1, run.last)):
         assert not piece.lies_on(known, wrong, codes, numbers)
 
 

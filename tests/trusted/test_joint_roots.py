@@ -11,7 +11,7 @@ from history_oracle import exact_history
 import enumsol
 from enumsol.condensation.enclosure import enclosure_of
 from enumsol.model.restart import SlipStart, restarted
-from enumsol.trusted.joint_roots import MOST_BETWEEN, joint_root
+from enumsol.trusted.at_alpha import MOST_BETWEEN, joint_root
 from enumsol.trusted.status_rows import OPEN, SLIP_MINUS, SLIP_PLUS, STICK
 
 CODES = {"open": OPEN, "stick": STICK, "slip+": SLIP_PLUS, "slip-": SLIP_MINUS}

@@ -15,8 +15,8 @@ from enumsol import ContactProblem
 from enumsol.arithmetic.rationals import rational
 from enumsol.condensation.exact import ExactSystem
 from enumsol.selections.rational_selections import ExactSelections
+from enumsol.trusted.arcs.precise import PreciseAtAlpha
 from enumsol.trusted.at_alpha import solve_selection
-from enumsol.trusted.precise_at_alpha import PreciseAtAlpha
 
 
 def nearly_singular(n, **changes):

@@ -16,15 +16,26 @@ import numpy as np
 
 from enumsol.arithmetic.algebraic import EnclosedAlpha
 from enumsol.arithmetic.rationals import rational
-from enumsol.branches.elements import Arc, ArcValues, Sides, Vertex, make_vertex, sides_of, with_exact_zeros
+from enumsol.branches.elements import (
+    END_ELSEWHERE,
+    SHORT_INTERVAL,
+    TOLD_APART,
+    Arc,
+    ArcValues,
+    Effort,
+    Sides,
+    Vertex,
+    make_vertex,
+    sides_of,
+    with_exact_zeros,
+)
 from enumsol.branches.enclosed.cutting import ArcPart, OpenCause, Trace
 from enumsol.branches.enclosed.joining import EventPlace, EventPlaceKind, Joined, JoinedArc, join
 from enumsol.branches.enclosed.tracing import trace
 from enumsol.branches.enclosed.zeros import enclosed
-from enumsol.branches.unfinished import END_ELSEWHERE, SHORT_INTERVAL, TOLD_APART, Effort
 from enumsol.condensation.data import EXACT_DOF_LIMIT
 from enumsol.model.statuses import FINAL, FRICTIONLESS, contact_status
-from enumsol.roots.linearisation import named_statuses
+from enumsol.roots.local_branch import named_statuses
 from enumsol.search.outcome import Stop
 from enumsol.support.deadlines import TimeOverError, over
 from enumsol.support.messages import counted, listed

@@ -15,8 +15,8 @@ from typing import TYPE_CHECKING
 
 from networkx.utils import UnionFind
 
+from enumsol.branches.elements import DEFECT, named
 from enumsol.branches.enclosed.cutting import ArcPart, ArcPartKind, OpenCause, Trace, parts_between
-from enumsol.branches.unfinished import DEFECT, named
 from enumsol.model.statuses import ACROSS
 
 if TYPE_CHECKING:

@@ -13,13 +13,12 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from scipy.optimize import brentq
 
-from enumsol.continuation.continuation_options import ContinuationOptions
 from enumsol.continuation.path import follow
-from enumsol.continuation.path_data import PathStatus
+from enumsol.continuation.path_data import ContinuationOptions, PathStatus
 from enumsol.errors import EnumsolError, Interrupted, OutOfMemoryError
 from enumsol.search.space.curve_proposals import corner_steps, curve_around, curve_point, placed, stretch
 from enumsol.support.deadlines import TimeOverError, look, tell
-from enumsol.trusted.space.curve_chains import CurveChain, CurveLink, goes_on, link_between
+from enumsol.trusted.space.curve_runs import CurveChain, CurveLink, goes_on, link_between
 from enumsol.trusted.space.solution_curve import only_curve
 
 if TYPE_CHECKING:

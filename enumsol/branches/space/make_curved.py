@@ -11,8 +11,17 @@ import numpy as np
 
 from enumsol.arithmetic.algebraic import EnclosedAlpha
 from enumsol.arithmetic.rationals import rational
-from enumsol.branches.elements import Arc, ArcValues, VertexKind, make_vertex, sides_of, tangential, with_exact_zeros
-from enumsol.branches.unfinished import END_ELSEWHERE, TOLD_APART
+from enumsol.branches.elements import (
+    END_ELSEWHERE,
+    TOLD_APART,
+    Arc,
+    ArcValues,
+    VertexKind,
+    make_vertex,
+    sides_of,
+    tangential,
+    with_exact_zeros,
+)
 from enumsol.model.statuses import ContactStatus, space_status
 from enumsol.search.space.curve_proposals import border_of_forces, border_of_zeta, curve_point, placed, unplaced
 from enumsol.trusted.space.curve_parts import Run, Turn, ends_of, side_of

@@ -16,8 +16,16 @@ from scipy.optimize import brentq
 from enumsol.proof.curve_records import CurveBoxRecord, CurvePart
 from enumsol.search.space.curve_proposals import curve_around, curve_point
 from enumsol.support.deadlines import look, tell
-from enumsol.trusted.space.curve_events import CurveMotion
-from enumsol.trusted.space.curve_parts import LinkParts, Place, Run, Turn, in_order, put_behind, up_to_bound
+from enumsol.trusted.space.curve_parts import (
+    CurveMotion,
+    LinkParts,
+    Place,
+    Run,
+    Turn,
+    in_order,
+    put_behind,
+    up_to_bound,
+)
 from enumsol.trusted.space.sector_rows import OPEN, STICK
 from enumsol.trusted.space.solution_curve import SLIP, only_curve
 
@@ -28,7 +36,7 @@ if TYPE_CHECKING:
 
     from enumsol.search.space.curve_proposals import CurvePoint
     from enumsol.selections.solution import Codes
-    from enumsol.trusted.space.curve_chains import CurveChain, CurveLink
+    from enumsol.trusted.space.curve_runs import CurveChain, CurveLink
     from enumsol.trusted.space.solution_curve import AlphaProblem, SolutionCurve
 
     Array = NDArray[np.float64]

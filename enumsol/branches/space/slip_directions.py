@@ -13,8 +13,7 @@ from enumsol.branches.space.pieces import curve_between
 from enumsol.search.space.curve_proposals import border_of_zeta, curve_around, curve_point, placed
 from enumsol.support.deadlines import look
 from enumsol.trusted.motions_of_body import direction
-from enumsol.trusted.space.curve_events import CurveMotion
-from enumsol.trusted.space.curve_parts import Place
+from enumsol.trusted.space.curve_parts import CurveMotion, Place
 from enumsol.trusted.space.solution_curve import SLIP, SolutionCurve, lies_in, parameter_in
 
 if TYPE_CHECKING:

@@ -10,12 +10,12 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from enumsol.branches.elements import ANOTHER_INTERVAL, MORE_NODES, MORE_TIME, SHORT_INTERVAL
 from enumsol.branches.graph_data import GraphStats
 from enumsol.branches.proof_records import graph_header
 from enumsol.branches.space.chains import chain_through
 from enumsol.branches.space.make_curved import CurvedGraph
 from enumsol.branches.space.pieces import runs_and_turns
-from enumsol.branches.unfinished import ANOTHER_INTERVAL, MORE_NODES, MORE_TIME, SHORT_INTERVAL
 from enumsol.branches.ways import Made
 from enumsol.condensation.enclosure import NotEnclosedError, enclosure_of
 from enumsol.model.sectors import SECTORS, is_sector, nearest, run_of
@@ -32,8 +32,8 @@ from enumsol.search.space.piece_tree import OpenLeaf, PieceTree, SpreadPieces
 from enumsol.search.space.space_setup import SpaceSolvers
 from enumsol.support.deadlines import TimeOverError, look, remaining, within
 from enumsol.support.messages import counted
-from enumsol.trusted.space.curve_chains import apart
 from enumsol.trusted.space.curve_parts import Run, arcs_over
+from enumsol.trusted.space.curve_runs import apart
 from enumsol.trusted.space.leaves import SpaceRoot, distinct_roots, settle
 from enumsol.trusted.space.solution_curve import AlphaProblem
 
@@ -41,9 +41,8 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Iterator, Sequence
     from concurrent.futures import Executor
 
-    from enumsol.branches.elements import Arc, Vertex
+    from enumsol.branches.elements import Arc, Tick, Vertex
     from enumsol.branches.graph_data import GraphData
-    from enumsol.branches.unfinished import Tick
     from enumsol.condensation.enclosure import CondensedEnclosure
     from enumsol.condensation.space_condensed import EnclosedSpace
     from enumsol.model.problem3d import ContactProblem3D
@@ -52,8 +51,8 @@ if TYPE_CHECKING:
     from enumsol.proof.records import Record
     from enumsol.support.array_types import Alpha, Codes, Floats
     from enumsol.support.deadlines import Deadline
-    from enumsol.trusted.space.curve_chains import CurveChain
     from enumsol.trusted.space.curve_parts import Turn
+    from enumsol.trusted.space.curve_runs import CurveChain
 
     Bounds = tuple[Fraction, Fraction]
     #: The parts into which a curve is cut, and their records.

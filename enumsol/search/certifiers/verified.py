@@ -20,9 +20,8 @@ from enumsol.search.certifiers.exclusions import proven
 from enumsol.search.fathoming import propose, without_load
 from enumsol.search.reduction import NEAR
 from enumsol.selections.solution import SelectionSolution
-from enumsol.trusted.at_alpha import VerifiedSelection, settled_selection, solve_selection
+from enumsol.trusted.at_alpha import JointRoot, VerifiedSelection, settled_selection, solve_selection
 from enumsol.trusted.exclusion import Terms
-from enumsol.trusted.joint_roots import JointRoot
 from enumsol.trusted.status_rows import CONDITIONS as ROWS, FREE, NONNEGATIVE, SLIP_MINUS, SLIP_PLUS, row_signs
 from enumsol.trusted.uniqueness import ClosedSolution, closed_solution, same_solution
 

@@ -34,8 +34,7 @@ if TYPE_CHECKING:
     from enumsol.search.space.piece_certificates import ExaminedPiece
     from enumsol.search.space.piece_multipliers import AlphaPoint
     from enumsol.support.array_types import Codes, Floats, Mask
-    from enumsol.trusted.space.curve_chains import CurveChain
-    from enumsol.trusted.space.curve_runs import CurveParts
+    from enumsol.trusted.space.curve_runs import CurveChain, CurveParts
     from enumsol.trusted.space.leaves import Open, SpaceRoot
     from enumsol.trusted.space.pieces import AlphaPiece, LeafArc
     from enumsol.trusted.space.solution_curve import SolutionCurve

@@ -15,7 +15,7 @@ from enumsol.arithmetic.balls import Ball
 from enumsol.condensation.space_condensed import SpaceSystem
 from enumsol.model.statuses import UNDECIDED
 from enumsol.search.space.space_fathoming import DefiniteForm
-from enumsol.trusted.space.curve_runs import CurveParts, KnownCurve, Run
+from enumsol.trusted.space.curve_runs import CurveParts, KnownCurve, LinkRange
 from enumsol.trusted.space.space_uniqueness import PieceWeights, equations, how_far_off
 
 if TYPE_CHECKING:
@@ -40,18 +40,18 @@ class Passage(NamedTuple):
     """A run of a known curve that passes every alpha of a piece, and its parts there."""
 
     curve: int
-    run: Run
+    run: LinkRange
     parts: CurveParts
 
 
-def runs_over(known: KnownCurve, low: Fraction, high: Fraction) -> list[Run]:
+def runs_over(known: KnownCurve, low: Fraction, high: Fraction) -> list[LinkRange]:
     """The runs of a curve that pass every alpha of a piece, each as short as may be."""
     (first, last), count = known.joint_alphas, len(known.chain.links)
     below, above = np.nextafter(float(low), -np.inf), np.nextafter(float(high), np.inf)
     sides = (first >= above).astype(int) - (last <= below)
     sides = np.concatenate([sides[:-1], sides[:-1]]) if known.chain.closed else sides
     beside = np.flatnonzero(sides)
-    found = {Run(int(j) % count, int(k - 1) % count) for j, k in pairwise(beside) if sides[j] == -sides[k]}
+    found = {LinkRange(int(j) % count, int(k - 1) % count) for j, k in pairwise(beside) if sides[j] == -sides[k]}
     return sorted(found)
 
 
@@ -182,7 +182,7 @@ class ExaminedPiece:
         piece = self.piece if piece is None else piece
         parts = self.parts.setdefault((piece.low, piece.high), [])
         for known in curves[len(parts) :]:
-            whole = Run(0, len(known.chain.links) - 1)
+            whole = LinkRange(0, len(known.chain.links) - 1)
             parts.append(known.over(whole, piece.low, piece.high))
         return list(zip(curves, parts, strict=True))
 

@@ -21,7 +21,7 @@ from enumsol.search.space.space_newton import Isotropic
 from enumsol.search.space.space_search import SpaceSplitting
 from enumsol.search.splitting import ImposedRows
 from enumsol.trusted.floating_bounds import motion_beside
-from enumsol.trusted.space.resultants import resultants
+from enumsol.trusted.space.force_bound import resultants
 from enumsol.trusted.space.sector_rows import FORCE, FREE, GAP, OF_DISCS, TAU, Row, row_sign, sector_row_terms
 
 if TYPE_CHECKING:

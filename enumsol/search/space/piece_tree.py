@@ -40,7 +40,7 @@ if TYPE_CHECKING:
     from enumsol.relaxation.space_relaxation import SpaceRelaxation
     from enumsol.search.parts import TreePart
     from enumsol.support.array_types import Codes, Floats
-    from enumsol.trusted.space.curve_chains import CurveChain
+    from enumsol.trusted.space.curve_runs import CurveChain
 
     #: The record of a node, and its children.
     Done = tuple[Record | "OpenLeaf", list["PieceNode"]]

@@ -39,8 +39,8 @@ from enumsol.search.certifiers.protocol import WIDEN, Bound, Certifier, Refine, 
 from enumsol.search.outcome import HOLD
 from enumsol.search.space.open_leaves import Cause, KnownBoxes, obstacle, sector_to_halve
 from enumsol.trusted.floating_bounds import motion_beside
+from enumsol.trusted.space.force_bound import resultants, unbounded
 from enumsol.trusted.space.leaves import Open, SpaceRoot, settle
-from enumsol.trusted.space.resultants import resultants, unbounded
 from enumsol.trusted.space.sector_rows import is_sector_covering, is_within
 from enumsol.trusted.space.space_uniqueness import LeafReference, OnlySolution
 from enumsol.trusted.space.turning import turned_by

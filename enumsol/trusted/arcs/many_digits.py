@@ -122,7 +122,7 @@ def refined_table(problem: ContactProblem) -> list[list[Any]] | None:
     A, _ = scaled(sp.csr_array(problem.A), scale, scale)
     slope = np.zeros(problem.n) if problem.load_slope is None else problem.load_slope
     K = _columns(np.column_stack([problem.contact_rows.toarray().T, problem.f, slope]), scale)
-    entries = _Integers.of(*_parts(A.data))
+    entries = _ScaledIntegers.of(*_parts(A.data))
     X, E, bits = _refined(problem, A, entries, K, scale)
     size = problem.contact_rows.shape[0]
     first = fmpz_mat(K.values.T[:size].tolist()) * fmpz_mat(X.tolist())
@@ -139,7 +139,7 @@ def refined_table(problem: ContactProblem) -> list[list[Any]] | None:
     return table
 
 
-class _Integers(NamedTuple):
+class _ScaledIntegers(NamedTuple):
     """Numbers as integers, values * 2^-bits; the columns of a matrix may have units, 2^unit, beside that."""
 
     values: NDArray[Any]
@@ -147,7 +147,7 @@ class _Integers(NamedTuple):
     units: list[int]
 
     @classmethod
-    def of(cls, whole: NDArray[Any], exponent: NDArray[Any], units: NDArray[Any] | None = None) -> _Integers:
+    def of(cls, whole: NDArray[Any], exponent: NDArray[Any], units: NDArray[Any] | None = None) -> _ScaledIntegers:
         """The numbers whole * 2^exponent."""
         exponent = np.where(whole != 0, exponent if units is None else exponent - units, 0)
         bits = -int(np.min(exponent, initial=0))
@@ -156,13 +156,13 @@ class _Integers(NamedTuple):
         )
 
 
-def _columns(floats: Floats, scale: Floats) -> _Integers:
+def _columns(floats: Floats, scale: Floats) -> _ScaledIntegers:
     """The columns of K, A's scaling applied, in units in which their largest entries are near one."""
     whole, exponent = _parts(floats)
     # a product by a power of two, without the underflow that floats may have
     exponent = exponent + np.frexp(scale)[1][:, None] - 1
     largest = np.max(np.where(whole != 0, exponent + 53, -(2**30)), axis=0)
-    return _Integers.of(whole, exponent, np.where(np.any(whole, axis=0), largest, 0))
+    return _ScaledIntegers.of(whole, exponent, np.where(np.any(whole, axis=0), largest, 0))
 
 
 def _parts(floats: Floats) -> tuple[NDArray[Any], NDArray[Any]]:
@@ -172,7 +172,7 @@ def _parts(floats: Floats) -> tuple[NDArray[Any], NDArray[Any]]:
 
 
 def _refined(
-    problem: ContactProblem, A: sp.csr_array, entries: _Integers, K: _Integers, scale: Floats
+    problem: ContactProblem, A: sp.csr_array, entries: _ScaledIntegers, K: _ScaledIntegers, scale: Floats
 ) -> tuple[NDArray[Any], NDArray[Any], int]:
     """X times 2^_SOLUTION_BITS, the exact residual K - A X times 2^bits, and bits."""
     bits = entries.bits + _SOLUTION_BITS + K.bits

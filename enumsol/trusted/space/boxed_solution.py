@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from enumsol.arithmetic.balls import SAFE, TINY, Ball, determinant_sign, smaller, solution
-from enumsol.trusted.joint_roots import told_apart
+from enumsol.trusted.at_alpha import told_apart
 from enumsol.trusted.space.krawczyk import MARGIN, NaturalMap
 from enumsol.trusted.space.natural_map import Discs, are_steps, upper_product
 from enumsol.trusted.space.space_uniqueness import LooseSolution, displacements, moderate_units
@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 
     from enumsol.condensation.space_condensed import EnclosedSpace
     from enumsol.support.array_types import Floats
-    from enumsol.trusted.joint_roots import Apart
+    from enumsol.trusted.at_alpha import Apart
     from enumsol.trusted.space.leaves import SpaceRoot
 
     _AnyLeaf = tuple[tuple[int, ...], "SpaceRoot | BoxedSolution"]

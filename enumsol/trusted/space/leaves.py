@@ -12,15 +12,20 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from enumsol.arithmetic.balls import SAFE, UNIT, Ball, determinant_sign, nearly_singular, rough_inverse
-from enumsol.trusted.joint_roots import Apart, told_apart
-from enumsol.trusted.space.leaf_conditions import Drift, are_outside, drift_in, is_broken, slacks, span_in
+from enumsol.trusted.at_alpha import Apart, told_apart
 from enumsol.trusted.space.leaf_equations import (
     ROUNDED_ANGLE,
+    Drift,
     Leaf,
     State,
+    are_outside,
     around_middle,
+    drift_in,
+    is_broken,
     patterns,
+    slacks,
     slopes_by_second,
+    span_in,
     turned,
     with_free_bounds,
 )

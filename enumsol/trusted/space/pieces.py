@@ -12,17 +12,20 @@ import numpy as np
 
 from enumsol.arithmetic.balls import SAFE, TINY, UNIT, Ball
 from enumsol.condensation.space_condensed import PieceSpace
-from enumsol.trusted.space.leaf_conditions import by_parameter, chosen_parameter, condition_rates, slacks
+from enumsol.trusted.space.force_bound import is_unbalanced_in_space
 from enumsol.trusted.space.leaf_equations import (
     ROUNDED_ANGLE,
     Leaf,
     around_middle,
+    by_parameter,
+    chosen_parameter,
+    condition_rates,
     patterns,
+    slacks,
     turned,
     with_free_bounds,
 )
 from enumsol.trusted.space.leaves import Open, SpaceRoot, settle
-from enumsol.trusted.space.resultants import is_unbalanced_in_space
 from enumsol.trusted.space.sector_margins import swept_margin
 from enumsol.trusted.space.space_uniqueness import is_complete, only_on_curve
 
@@ -31,7 +34,7 @@ if TYPE_CHECKING:
 
     from enumsol.condensation.space_condensed import AlphaSpace, EnclosedSpace, PieceSpace
     from enumsol.support.array_types import Codes, Floats
-    from enumsol.trusted.space.curve_runs import KnownCurve, Run
+    from enumsol.trusted.space.curve_runs import KnownCurve, LinkRange
     from enumsol.trusted.space.sector_rows import Row
     from enumsol.trusted.space.solution_curve import AlphaProblem, SolutionCurve
 
@@ -155,7 +158,9 @@ class AlphaPiece:
             found = piece.held(codes)
         return piece, found
 
-    def lies_on(self, known: KnownCurve, run: Run, codes: Sequence[int], numbers: Floats, errors: float = 1.0) -> bool:
+    def lies_on(
+        self, known: KnownCurve, run: LinkRange, codes: Sequence[int], numbers: Floats, errors: float = 1.0
+    ) -> bool:
         """True if all solutions with the statuses of an assignment, at every alpha of the piece, are those of a run.
 
         Parameters

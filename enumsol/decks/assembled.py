@@ -90,7 +90,7 @@ class AssembledStiffness:
         return row
 
 
-def read_calculix_stiffness(job: str | os.PathLike[str]) -> AssembledStiffness:
+def read_calculix_stiffness(job: str | os.PathLike[str], *, plane: bool = False) -> AssembledStiffness:
     r"""Matrix that a step ``*FREQUENCY, SOLVER=MATRIXSTORAGE`` of CalculiX has written.
 
     Parameters
@@ -98,6 +98,9 @@ def read_calculix_stiffness(job: str | os.PathLike[str]) -> AssembledStiffness:
     job : str or path-like
         Name of the job, without an ending: ``job.sti`` has a line "row column value" for each entry of one triangle,
         ``job.dof`` the node and the direction of each row, such as 12.3.
+    plane : bool
+        The model is plane: what moves in direction 3 belongs to the thickness of elements, to which CalculiX may give
+        one name twice, and gets the nodes -1, -2, ...
 
     Raises
     ------
@@ -120,6 +123,8 @@ def read_calculix_stiffness(job: str | os.PathLike[str]) -> AssembledStiffness:
         rows, columns, values = table[:, 0].astype(np.int64) - 1, table[:, 1].astype(np.int64) - 1, table[:, 2]
     with reading(place.with_name(f"{place.name}.dof"), "degrees of freedom", "CalculiX"):
         names = [_name(*line.split(".")) for line in place.with_name(f"{place.name}.dof").read_text().split()]
+    if plane:
+        names = [(node, axis) if axis < 3 else (-1 - row, axis) for row, (node, axis) in enumerate(names)]
     return _stiffness(place, rows, columns, values, names)
 
 
