@@ -27,7 +27,7 @@ if TYPE_CHECKING:
 #: Of the subtrees that a task gives back, so many become tasks of their own: those nearest to the root of the tree.
 ALONE = 4
 #: Tasks that follow on others examine twice as many nodes as these, up to so many times.
-DOUBLED = 2
+DOUBLED = 3
 
 
 @dataclass(frozen=True)
