@@ -47,6 +47,8 @@ class GraphStats:
         Nodes of all trees.
     selections : int
         Complete selections whose arcs were computed.
+    bounded : int
+        Of a body that nothing holds, pieces whose proof rests, or may rest, on the bound of its rigid displacement.
     search_seconds, seconds : float
         Wall time of the search, and of everything.
     """
@@ -55,6 +57,7 @@ class GraphStats:
     closed: int = 0
     nodes: int = 0
     selections: int = 0
+    bounded: int = 1
     search_seconds: float = 0.0
     seconds: float = 0.0
 
@@ -160,7 +163,7 @@ class GraphData(Immutable):
         if not self.complete:
             return "complete: not proven (degrees balance at every vertex)"
         about = "" if self.certified_data == "problem" else " for S and g as computed"
-        if not self.problem.held:
+        if not self.problem.held and self.stats.bounded:
             about = f", within rigid displacements of {self.problem.rigid_reach:g}"
         return f"complete: yes (proven{about})"
 

@@ -73,9 +73,14 @@ def write_graph_proof(
                 # begins the record of a form, which is no leaf
                 writer.write(["q", *declared.tolist()])
             writer.write([kind, _text(leaf.codes), *packed(leaf.rows, leaf.values)])
-        if found.numbers is not None:
-            numbers = found.numbers
-            writer.write(["m", *(part.tolist() for part in (numbers.mu, numbers.kappa, numbers.nu))])
+        if found.closed is not None:
+            numbers, beside = found.closed.numbers, found.closed.leaves
+            more = [] if problem.held else [[numbers.balance, numbers.share, numbers.degree]]
+            writer.write(["m", *(part.tolist() for part in (numbers.mu, numbers.kappa, numbers.nu)), *more])
+            for codes, said in beside:
+                kind, *entries = said.write()
+                writer.write([kind, _text(codes), *entries])
+            leaves += len(beside)
         for kind, kept in (("s", found.selections), ("c", found.cut)):
             for codes in kept:
                 writer.write([kind, _text(codes)])

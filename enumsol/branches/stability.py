@@ -13,7 +13,7 @@ from enumsol.search.growing_motions import GrowingMotions
 from enumsol.search.stability import Proven, StabilitySearch
 from enumsol.support.deadlines import look
 from enumsol.trusted.motions_of_body import friction_over
-from enumsol.trusted.running_away import Growing, everywhere
+from enumsol.trusted.running_away import Growing, left_open
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -30,6 +30,8 @@ if TYPE_CHECKING:
 #: Parts of an arc that are tried, which decides how much time an arc costs along which nothing is proven; and how short
 #: they are at the end, relative to the arc, about an alpha at which the verdict changes.
 _PARTS, _SHORTEST = 160, 2.0**-12
+#: Parts that are left then are searched as a whole, with at most so many programs, until that fails so often.
+_PROGRAMS, _FAILURES = 20, 16
 #: Growing motions of a range of alpha are looked for between such powers of two: K(mu) is enclosed at few mu then.
 _GRIDS = (1 / 32, 1 / 8, 1 / 2)
 
@@ -85,13 +87,15 @@ class ArcStabilities:
         #: Proofs at some alphas of the arc, by the contact rows of the part that they are about.
         self._hints: dict[tuple[int, ...], list[Proven]] = {}
         self._directions: SlipDirections | None = None
+        #: After so many parts were searched as a whole in vain.
+        self._failures = _FAILURES
 
     def spans(self, arc: Arc, arcs: Sequence[Arc] = ()) -> tuple[Span, ...]:
         """Verdicts along an arc, from its lower end to its upper one; ``arcs`` are all of its graph, for 3D."""
         look()
         if arc.grazing or arc.dimension:
             return (Span(arc.lo, arc.hi, "undecided"),)
-        self._hints = {}
+        self._hints, self._failures = {}, _FAILURES
         if self._asked.body.tangents > 1:
             from enumsol.branches.space.slip_directions import SlipDirections  # for graphs in 3D only
 
@@ -104,10 +108,12 @@ class ArcStabilities:
     def _divided(self, arc: Arc) -> list[Span]:
         """Verdicts in parts of an arc, halved where nothing is proven, the longest first."""
         left, found = [(-arc.length, arc.lo, arc.hi)], list[Span]()
-        for _ in range(_PARTS):
+        for count in range(2 * _PARTS):
             if not left:
                 break
             look()
+            if count == _PARTS:
+                self._failures = 0
             _, low, high = heapq.heappop(left)
             known, middle = self._piece(arc, low, high), 0.5 * (low + high)
             if known is None and high - low > _SHORTEST * arc.length and low < middle < high:
@@ -149,11 +155,20 @@ class ArcStabilities:
             extended = _extended(hint, setting)
             if extended is not False:
                 return extended
-        if any(_extended(hint, at) is not False for hint in hints):
-            return False  # known at the middle: the range is too long
-        proven = StabilitySearch(at.stiffness, at.motions).run()
-        hints[:] = [proven, *hints[:3]]
-        return _extended(proven, setting)
+        known = [found for hint in hints if (found := _extended(hint, at)) is not False]
+        if not known:
+            proven = StabilitySearch(at.stiffness, at.motions).run()
+        elif known[0] is not True or self._failures == _FAILURES:
+            return False  # the range is too long
+        else:
+            # numbers that serve in the middle may leave no room where others do
+            proven = StabilitySearch(setting.stiffness, setting.motions, most_programs=_PROGRAMS).run()
+        extended = _extended(proven, setting)
+        if known and extended is False:
+            self._failures += 1
+        else:
+            hints[:] = [proven, *hints[:3]]
+        return extended
 
 
 def _extended(proven: Proven, setting: Setting) -> bool | tuple[float, float]:
@@ -173,9 +188,9 @@ def _extended(proven: Proven, setting: Setting) -> bool | tuple[float, float]:
             wider = Growing(low, high, tried.way)
             if wider.found(stiffness, motions) is not None:
                 return rate_bounds(low, high)
-    if proven.growing or proven.gaps or not everywhere(proven.ranges):
+    if proven.growing or proven.gaps or left_open(proven.leaves) is not None:
         return False
-    return all(leaf.holds(stiffness, motions) for _, _, leaves in proven.ranges for leaf in leaves)
+    return all(leaf.holds(stiffness, motions) for leaf in proven.leaves)
 
 
 def _joined(spans: Sequence[Span]) -> list[Span]:

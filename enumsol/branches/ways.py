@@ -158,11 +158,11 @@ class PlaneWay:
             # lambda = 0 is the only solution at every alpha, and every selection holds there: one is enough
             self.candidates = {(OPEN,) * self.exact.p}
             return
-        if self.traced is not None and self.problem.held:
+        if self.traced is not None:
             # pieces that need no tree are found while there is time
             search.closed = self.closed.pieces
             with suppress(TimeOverError), within(Deadline(search.deadline)):
-                self.closed.find(self.traced)
+                self.closed.find(self.traced, search.worker)
         if executor is None:
             search.run()
         else:
@@ -243,9 +243,10 @@ class PlaneWay:
                 proof = partial(write_graph_proof, *given, "condensed", search.pieces, None)
         stats = GraphStats(
             pieces=len(search.pieces),
-            closed=sum(found.numbers is not None for found in search.pieces),
+            closed=sum(found.closed is not None for found in search.pieces),
             nodes=search.nodes,
             selections=len(candidates),
+            bounded=sum(found.closed.bounded if found.closed else found.system is not None for found in search.pieces),
         )
         return Made(*elements, (*map(str, stops), *reasons), stats, self.exact, tuple(search.pieces), proof)
 

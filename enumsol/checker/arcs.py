@@ -11,7 +11,7 @@ g vanishes, and indices balance. What a proof leaves open is counted.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 from fractions import Fraction
 from functools import cached_property
 from itertools import pairwise
@@ -20,10 +20,12 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from enumsol.checker.arc_boxes import Boxes, BoxSelection, alpha_number, check_entries, inside
+from enumsol.proof.leaves import OnlyReference, Unbalanced
 from enumsol.proof.reading import RefusedError, codes_from, names_only, numbers_from, quoted, same, units_from
 from enumsol.support.deadlines import tell
-from enumsol.trusted.arcs.only_branch import only_roots
+from enumsol.trusted.arcs.only_branch import branch_references, only_roots
 from enumsol.trusted.arcs.selection_balls import ArcSelection, ArcSystem
+from enumsol.trusted.floating_bounds import without_bound
 from enumsol.trusted.over_interval import PieceNumbers
 from enumsol.trusted.selection import CONE_MINUS, CONE_PLUS, NORMAL_FORCE, PENETRATION, SLIP_BACKWARD, SLIP_FORWARD
 from enumsol.trusted.status_rows import FRICTIONLESS, OPEN, SLIP_MINUS, SLIP_PLUS, STICK
@@ -38,8 +40,10 @@ if TYPE_CHECKING:
     Span = tuple[Fraction, Fraction, int]
 
 
-#: Entries of the record.
-_ENTRIES = 4
+#: Entries of the record, of a body that nothing holds with those of its form.
+_ENTRIES, _FLOATING_ENTRIES = 4, 5
+#: Of theta.
+_MOST_DEGREE = 32
 
 
 @dataclass(eq=False)
@@ -84,22 +88,41 @@ class ClaimedArc:
     head: ClaimedEvent | None = None
 
 
-@dataclass(frozen=True)
+@dataclass(eq=False)
 class ClosedPiece:
-    """A piece whose solutions are said to lie on the arcs through it."""
+    """A piece whose solutions are said to lie on the arcs through it.
+
+    Attributes
+    ----------
+    a, b : Fraction
+    numbers : PieceNumbers
+    leaves : list of (codes, record)
+        Of a body that nothing holds: below which assignments there is nothing else.
+    bounded : bool
+        That was shown within the bound of its rigid displacement only.
+    """
 
     a: Fraction
     b: Fraction
     numbers: PieceNumbers
+    leaves: list[tuple[Codes, OnlyReference | Unbalanced]] = field(default_factory=list)
+    bounded: bool = False
 
     @classmethod
-    def read(cls, a: Fraction, b: Fraction, record: list[Any], p: int) -> ClosedPiece:
+    def read(cls, a: Fraction, b: Fraction, record: list[Any], p: int, *, held: bool) -> ClosedPiece:
         """From its record."""
-        if len(record) != _ENTRIES:
-            raise ValueError(f"a record of kind 'm' has {len(record)} entries; expected {_ENTRIES}")
-        numbers = PieceNumbers(*(numbers_from(values, p) for values in record[1:]))
+        expected = _ENTRIES if held else _FLOATING_ENTRIES
+        if len(record) != expected:
+            raise ValueError(f"a record of kind 'm' has {len(record)} entries; expected {expected}")
+        mu, kappa, nu = (numbers_from(values, p) for values in record[1:4])
+        numbers = PieceNumbers(mu, kappa, nu)
+        if not held:
+            balance, share, degree = numbers_from(record[4], 3).tolist()
+            if degree not in range(1, _MOST_DEGREE + 1):
+                raise ValueError(f"the degree of theta is not among 1 to {_MOST_DEGREE}")
+            numbers = replace(numbers, balance=balance, share=share, degree=int(degree))
         if not numbers.usable:
-            raise ValueError("a number mu or kappa is not positive")
+            raise ValueError("a number mu or kappa is not positive, or the factor of the balance negative")
         return cls(a, b, numbers)
 
     def failure(self, arcs: Sequence[ClaimedArc], systems: dict[int, ArcSystem], origin: Fraction | None) -> str | None:
@@ -113,7 +136,25 @@ class ClosedPiece:
             low = self.a if arc.tail is None else max(self.a, arc.tail.zero[0])
             high = self.b if arc.head is None else min(self.b, arc.head.zero[1])
             spans.append((ArcSelection(systems[side], arc.codes), _below(low), -_below(-high)))
-        return None if all(only_roots(spans, self.numbers)) else "its arcs are not proven to hold all its solutions"
+        system = systems[side]
+        proven = all(only_roots(spans, self.numbers)) if not len(system.reach) else self._covered(spans, system)
+        return None if proven else "its arcs are not proven to hold all its solutions"
+
+    def _covered(self, spans: Sequence[tuple[ArcSelection, float, float]], system: ArcSystem) -> bool:
+        """True if every leaf is proven to hold nothing beside the arcs (theory, section 14.16)."""
+        ends = _below(self.a), -_below(-self.b)
+        known, free = branch_references(spans, self.numbers), without_bound(system.at(*ends)).reach
+        for codes, leaf in self.leaves:
+            if isinstance(leaf, Unbalanced):
+                if not system.unbalanced(codes, *ends, leaf.direction):
+                    return False
+            elif not known:
+                return False
+            elif not all(leaf.holds(one, codes, free) for one in known):
+                self.bounded = True
+                if not all(leaf.holds(one, codes, system.reach) for one in known):
+                    return False
+        return True
 
     def _chain(self, arcs: Sequence[ClaimedArc]) -> list[ClaimedArc] | None:
         """Arcs one after another, of which one holds at every alpha of the piece."""

@@ -5,7 +5,8 @@ Records (see enumsol.proof.proof_file for the file and the reader): a header ``{
 for every piece ``{"piece": [a, b], "force", "length", "roots"}``, then its leaves ``["x", codes, rows, multipliers]``
 (no solution anywhere in the piece), ``["f", codes, rows, multipliers]`` (the same by the form declared last, ``["q",
 mu, nu, alpha, beta]``), ``["s", codes]`` (a surviving selection) and ``["c", codes]`` (left to both halves of the
-piece), or ``["m", mu, kappa, nu]`` (all solutions lie on the arcs of the surviving selections); then, if the proof
+piece), or ``["m", mu, kappa, nu]`` (all solutions lie on the arcs of the surviving selections; of a body that nothing
+holds that is shown by leaves ``["o", codes, 1, rows, products]`` and ``["i", codes, direction]``); then, if the proof
 holds them, arcs (see enumsol.checker.arcs); at the end ``{"pieces", "leaves", "selections"}``, with arcs ``"traces"``
 and ``"arcs"``, too. Codes are strings of p digits; ends of pieces are fractions ``"a/b"`` in decimal digits.
 
@@ -30,10 +31,23 @@ from enumsol.checker.walk import ProofChecker
 from enumsol.condensation.enclosure import CondensedEnclosure
 from enumsol.condensation.unloaded import vanishing_alpha
 from enumsol.proof import reading
+from enumsol.proof.leaves import OnlyReference, Unbalanced
+from enumsol.proof.records import Limits, Tree
 from enumsol.support.deadlines import tell
 from enumsol.trusted.exclusion import Leaves, Terms, exclusion_margin, exclusion_margins
 from enumsol.trusted.over_interval import KINDS, EnclosedPiece, as_computed
-from enumsol.trusted.status_rows import CONTACT, FRICTIONLESS, OPEN, SLIP_MINUS, STICK, UNDECIDED, children_of
+from enumsol.trusted.status_rows import (
+    BACKWARD,
+    CONTACT,
+    FORWARD,
+    FRICTIONLESS,
+    OPEN,
+    SLIP_MINUS,
+    SLIP_PLUS,
+    STICK,
+    UNDECIDED,
+    coverings_of,
+)
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Mapping, Sequence
@@ -48,9 +62,12 @@ if TYPE_CHECKING:
 
 #: Entries of a leaf's record, by its kind, and those of a form's.
 _ENTRIES = {"x": 4, "f": 4, "s": 2, "c": 2}
-#: Kinds that do not rest on a stiffness that is positive definite.
+#: Kinds that do not rest on a stiffness that is positive definite; and those of pieces without a tree.
 _OF_ANY_BODY = ("x", "s", "c")
+_BESIDE_ARCS: dict[str, tuple[int, Any]] = {"o": (5, OnlyReference), "i": (3, Unbalanced)}
 _FORM, _FORM_ENTRIES = "q", 5
+#: Of a piece's leaves beside arcs, at most so many times p^2.
+_MOST_BESIDE_ARCS = 64
 #: Begins the record of a piece without a tree.
 _CLOSED = "m"
 END = object()
@@ -114,6 +131,8 @@ class GraphChecker(ProofChecker):
         self._handed: dict[tuple[int, ...], list[tuple[Fraction, Fraction]]] = {}
         self._closed: list[ClosedPiece] = []
         self.interval: tuple[Fraction, Fraction] | None = None
+        #: A piece has leaves of a tree that is not all left to its halves.
+        self._in_trees = False
         self.data: Data = "problem"
         self._arcs: ArcChecker | None = None
         self._friction: list[bool] = []
@@ -129,8 +148,13 @@ class GraphChecker(ProofChecker):
             failures=tuple(self.failures),
             interval=self.interval,
             leaves=self.leaves,
-            within=None if self.problem.held else self.problem.rigid_reach,
+            within=self.problem.rigid_reach if self._bounded else None,
         )
+
+    @property
+    def _bounded(self) -> bool:
+        """True if something was shown within the bound of the rigid displacement only."""
+        return not self.problem.held and (self._in_trees or any(closed.bounded for closed in self._closed))
 
     def _report(self) -> GraphVerificationReport:
         """Counts of what was checked."""
@@ -227,11 +251,18 @@ class GraphChecker(ProofChecker):
         elif np.any((handed != OPEN) & ((handed == FRICTIONLESS) == np.array(self._friction))):
             self.fail(f"piece {number}: a surviving selection has a status that a node cannot have")
         if piece.closed is not None:
-            if np.any(piece.roots != UNDECIDED) or len(handed) < len(piece.leaves()) or piece.declared is not None:
+            beside = np.array([codes for codes, _ in piece.closed.leaves], dtype=np.uint8).reshape(-1, self.problem.p)
+            covering = np.concatenate([beside, piece.leaves("x")])
+            empty = 0 if self.problem.held else len(piece.leaves("x"))
+            other = len(handed) + empty < len(piece.leaves()) or piece.declared is not None
+            whole = self.problem.held or covers(piece.roots, covering, self._friction)
+            if np.any(piece.roots != UNDECIDED) or other or not whole:
                 self.fail(f"piece {number}: it is decided by its arcs, but not whole, or has other leaves")
             self._closed.append(piece.closed)
-        elif not covers(piece.roots, piece.leaves(), self._friction):
-            self.fail(f"piece {number}: its leaves do not cover all selections")
+        else:
+            self._in_trees |= not np.array_equal(piece.leaves(), piece.leaves("c"))
+            if not covers(piece.roots, piece.leaves(), self._friction):
+                self.fail(f"piece {number}: its leaves do not cover all selections")
         self.selections.update(row.tobytes() for row in handed)
         for row in handed.tolist():
             self._handed.setdefault(tuple(row), []).append((piece.a, piece.b))
@@ -253,11 +284,13 @@ class GraphChecker(ProofChecker):
         if batch[0][:1] == [_FORM] and self.problem.held:
             piece.declare(batch[0])
             batch = batch[1:]
-        elif batch[0][:1] == [_CLOSED] and self.problem.held:
+        elif batch[0][:1] == [_CLOSED]:
             if piece.closed is not None:
                 raise ValueError("it is decided by its arcs twice")
-            piece.closed = ClosedPiece.read(piece.a, piece.b, batch[0], self.problem.p)
+            piece.closed = ClosedPiece.read(piece.a, piece.b, batch[0], self.problem.p, held=self.problem.held)
             batch = batch[1:]
+        if piece.closed is not None and not self.problem.held:
+            batch = [record for record in batch if not self._read_beside_arcs(piece.closed, record)]
         for record in batch:
             kind = record[0] if record else None
             if not isinstance(kind, str) or kind not in kinds:
@@ -266,7 +299,9 @@ class GraphChecker(ProofChecker):
                 raise ValueError(f"a record of kind {kind!r} has {len(record)} entries; expected {kinds[kind]}")
         if not batch:
             return
-        codes = reading.codes_from([record[1] for record in batch], self.problem.p)
+        beside_arcs = piece.closed is not None and not self.problem.held
+        most = BACKWARD if beside_arcs else UNDECIDED
+        codes = reading.codes_from([record[1] for record in batch], self.problem.p, most)
         piece.codes += codes.tobytes()
         piece.kinds += "".join(record[0] for record in batch).encode()
         if len(piece.kinds) >= piece.look:
@@ -279,6 +314,26 @@ class GraphChecker(ProofChecker):
                 texts = (batch[k][2:] for k in empty)
                 terms = [reading.multipliers_from(text, KINDS * self.problem.p) for text in texts]
                 self._exclusions(within, codes[empty], terms)
+                if piece.closed is not None and beside_arcs and not piece.closed.bounded:
+                    margins = exclusion_margins(within.unbounded, Leaves.of(codes[empty], terms))
+                    piece.closed.bounded = not np.all(margins > 0)
+
+    def _read_beside_arcs(self, closed: ClosedPiece, record: list[Any]) -> bool:
+        """Keep a leaf below which there is nothing beside the arcs; False if the record is none."""
+        size, kind = _BESIDE_ARCS.get(record[0] if record and isinstance(record[0], str) else "", (0, None))
+        if kind is None:
+            return False
+        if len(record) != size:
+            raise ValueError(f"a record of kind {record[0]!r} has {len(record)} entries; expected {size}")
+        (codes,) = reading.codes_from([record[1]], self.problem.p, BACKWARD).tolist()
+        # the form of the piece is the one that is declared
+        given: Any = (closed.numbers,)
+        limits = Limits(tuple(codes), Tree.FLOATING_PLANE, self._friction, given, modes=self.problem.modes.r)
+        if len(closed.leaves) >= _MOST_BESIDE_ARCS * self.problem.p**2:
+            raise ValueError("it has too many leaves beside its arcs")
+        closed.leaves.append((tuple(codes), kind.of(record[2:], limits)))
+        self.leaves += 1
+        return True
 
     def _exclusions(self, within: EnclosedPiece, codes: Codes, terms: list[Terms]) -> None:
         margins = exclusion_margins(within, Leaves.of(codes, terms))
@@ -352,7 +407,7 @@ def covers(roots: Codes, leaves: Codes, friction: Sequence[bool]) -> bool:
         node = _split(cell, found if targets is None else targets, friction)
         if node is None:
             return False
-        for child in children_of(int(cell[node]), friction=friction[node]):
+        for child in _covering(int(cell[node]), found[:, node], friction=friction[node]):
             smaller = cell.copy()
             smaller[node] = child
             part = found[_refines(found[:, node], child)]
@@ -367,12 +422,21 @@ def _split(cell: Codes, refinements: Codes, friction: Sequence[bool]) -> int | N
     if not len(refinements):
         return None
     for node in np.flatnonzero(np.all(refinements != cell, axis=0)).tolist():
-        if children_of(int(cell[node]), friction=friction[node]):
+        if coverings_of(int(cell[node]), friction=friction[node]):
             return int(node)
     return None
+
+
+def _covering(code: int, finer: Codes, *, friction: bool) -> Sequence[int]:
+    """Statuses that cover that of a node, if possible such that all of these refine one of them."""
+    ways = coverings_of(code, friction=friction)
+    fits = (way for way in ways if np.all(np.any([_refines(finer, child) for child in way], axis=0)))
+    return next(fits, ways[0])
 
 
 def _refines(codes: Codes, coarse: int | Codes) -> Mask:
     """Mask of the codes that are ``coarse`` or refine it."""
     held = (coarse == CONTACT) & (codes >= STICK) & (codes <= SLIP_MINUS)
+    for sliding, slip in ((FORWARD, SLIP_PLUS), (BACKWARD, SLIP_MINUS)):
+        held = held | ((coarse == sliding) & ((codes == OPEN) | (codes == slip)))
     return np.asarray((codes == coarse) | (coarse == UNDECIDED) | held)

@@ -6,7 +6,6 @@ root stays undecided whatever the proof says. From that trusted code makes the m
 
 from __future__ import annotations
 
-import itertools
 import math
 from collections import Counter
 from dataclasses import dataclass
@@ -33,7 +32,7 @@ from enumsol.proof.stability_records import (
 )
 from enumsol.support.messages import counted
 from enumsol.trusted.motions_of_body import BodyMotions, friction_directions, friction_over
-from enumsol.trusted.running_away import Growing, NoMotion, covers
+from enumsol.trusted.running_away import Growing, NoMotion, left_open
 from enumsol.trusted.status_rows import OPEN, STICK
 
 if TYPE_CHECKING:
@@ -291,8 +290,7 @@ def _something_may_grow(part: Setting, given: list[Growing | NoMotion]) -> str |
         return "a motion is named, and nothing is said to grow"
     if not all(leaf.holds(part.stiffness, part.motions) for leaf in leaves):
         return "a certificate does not exclude motions in its range"
-    ends = sorted({0.0, math.inf, *(leaf.low for leaf in leaves), *(leaf.high for leaf in leaves)})
-    for low, high in itertools.pairwise(ends):
-        if not covers([leaf for leaf in leaves if leaf.low <= low and high <= leaf.high]):
-            return f"motions with growth rates from {math.sqrt(low):.3g} to {math.sqrt(high):.3g} are not excluded"
+    if (ends := left_open(leaves)) is not None:
+        low, high = map(math.sqrt, ends)
+        return f"motions with growth rates from {low:.3g} to {high:.3g} are not excluded"
     return None

@@ -19,9 +19,9 @@ from enumsol.cli.graph import graph, report
 from enumsol.cli.history import history
 from enumsol.cli.options import add_command
 from enumsol.cli.problems import collection_app, gallery_app
+from enumsol.cli.progress import guarded_streams, loud_again, say
 from enumsol.cli.roots import roots
 from enumsol.cli.solve import solve
-from enumsol.cli.streams import guarded_streams, loud_again, say
 from enumsol.cli.table import table
 from enumsol.errors import EnumsolError, OutputError
 from enumsol.support.messages import listed

@@ -11,8 +11,7 @@ from typing import TYPE_CHECKING, Any, NoReturn, TypeVar
 import typer
 
 from enumsol.cli.decks import DECK, deck_named, is_deck, step_chosen
-from enumsol.cli.progress import Display
-from enumsol.cli.streams import is_quiet, say
+from enumsol.cli.progress import Display, is_quiet, say
 from enumsol.errors import EnumsolError, Interrupted, InvalidArgumentError, OutOfMemoryError, OutputError
 from enumsol.support.messages import visible
 

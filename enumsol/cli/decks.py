@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Annotated, Any, NamedTuple
 
 import typer
 
-from enumsol.cli.streams import is_quiet, say
+from enumsol.cli.progress import is_quiet, say
 
 if TYPE_CHECKING:
     from enumsol.fem.deck_scenes import DeckModel
@@ -100,6 +100,11 @@ def deck_named(name: str) -> DeckModel:
     """
     place = Path(name)
     return _read(name, place.stat().st_mtime_ns if place.is_file() else 0, _CHOSEN.get())
+
+
+def ignored() -> tuple[str, ...]:
+    """What --ignore names."""
+    return _CHOSEN.get().ignore
 
 
 def step_chosen() -> int | None:

@@ -26,7 +26,7 @@ from typer.core import TyperCommand
 
 from enumsol.cli.common import TOML
 from enumsol.cli.decks import DECK, with_decks
-from enumsol.cli.streams import set_quiet
+from enumsol.cli.progress import set_quiet
 from enumsol.errors import InvalidArgumentError, MissingDependencyError
 from enumsol.support.files import check_replaceable
 

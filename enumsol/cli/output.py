@@ -21,7 +21,7 @@ from typing import TYPE_CHECKING, Any
 import typer
 
 from enumsol.cli.decks import options_said
-from enumsol.cli.streams import is_quiet, pour, say
+from enumsol.cli.progress import is_quiet, pour, say
 from enumsol.errors import InvalidArgumentError, MissingDependencyError, OutputError
 from enumsol.support.files import write_file
 

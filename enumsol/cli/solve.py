@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any, NamedTuple
 import typer
 
 from enumsol.cli.common import GALLERY, TOML, note, parse_alpha, refuse_misspelt, scene_of, units_of
-from enumsol.cli.decks import is_deck
+from enumsol.cli.decks import ignored, is_deck
 from enumsol.cli.options import LIMITS, OUTPUT, Argument, OutputFile, OutputFlag, Quiet, options_of, with_options
 from enumsol.cli.output import deliver, write_figure
 from enumsol.cli.progress import Display
@@ -336,7 +336,8 @@ def _scene(mesh: str, options: dict[str, Any]) -> Scene:
         raise InvalidArgumentError(f"{mesh}: {found}; expected a mesh with named parts, or a {TOML} file")
     check_keys(options, lambda name: _flags(name)[0])
     written = lambda name, part, number: f"{_flags(name)[0]} {part and f'{part}='}{number}"  # noqa: E731
-    return fem.mesh_scene(refuse_old_friction(mesh, options, written), **options)
+    source = fem.read_mesh(mesh, ignore=ignored()) if ignored() else mesh
+    return fem.mesh_scene(refuse_old_friction(source, options, written), **options)
 
 
 def _problem(mesh: str, scene: Scene) -> AnyProblem:

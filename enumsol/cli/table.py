@@ -70,7 +70,7 @@ def table(
     samples : Number of evenly spaced alphas, including both ends.
     alphas : A list of alphas instead, such as 1,2.5,8/3.
     arithmetic : Arithmetic of each enumeration, as in enumsol roots.
-    without : Leave out roots that are proven to run away; PROBLEM has a mesh or a mass.
+    without : Leave out roots that are proven to run away; undecided ones stay. PROBLEM has a mesh or a mass.
     max_nodes : Largest number of nodes of the tree at one alpha.
     time_limit : Longest time of the search at one alpha.
     jobs : Number of processes, each of which searches one alpha at a time.

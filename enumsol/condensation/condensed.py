@@ -21,8 +21,6 @@ if TYPE_CHECKING:
 UNIT_EXPONENT = 900
 #: Squares of friction coefficients, times contact forces, must not overflow.
 LARGEST_FRICTION = 1e100
-#: Right-hand sides solved at once; bounds the dense memory of a condensation to this many vectors of length n.
-RHS_BLOCK = 16
 #: How many roundings for every row of S, with a unit diagonal, its eigenvalues may be off by.
 _ROUNDINGS = 4
 #: Rigid displacements whose contact nodes move less, squared and relative to the largest, move none.

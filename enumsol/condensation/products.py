@@ -13,9 +13,6 @@ from enumsol.support.array_types import Floats, Mask
 from enumsol.support.deadlines import look, tell
 from enumsol.support.immutable import Sealed
 
-#: Columns that are made dense together.
-_COLUMNS = 16
-
 
 @dataclass(frozen=True)
 class Products(Sealed):
@@ -94,10 +91,11 @@ class Products(Sealed):
             B_size, sliced = abs(B), SlicedMatrix(A) if refined else None
             mid, rounded = np.empty((B.shape[0], K.shape[1])), np.empty((B.shape[0], K.shape[1]))
             lengths, left = np.empty(K.shape[1]), np.empty(K.shape[1])
-            for start in range(0, K.shape[1], _COLUMNS):
+            width = problem.factorization.columns
+            for start in range(0, K.shape[1], width):
                 look()
                 tell("columns of A^-1 B'", start, K.shape[1])
-                part = slice(start, min(start + _COLUMNS, K.shape[1]))
+                part = slice(start, min(start + width, K.shape[1]))
                 given = K[:, part].toarray()
                 X = solve(given)
                 if sliced is None:

@@ -9,7 +9,8 @@ from typing import TYPE_CHECKING, Any, TypeVar
 
 import numpy as np
 
-from enumsol.condensation.condensed import RHS_BLOCK, condensation_of
+from enumsol.condensation.condensed import condensation_of
+from enumsol.condensation.factorization import RHS_BLOCK
 from enumsol.errors import InvalidArgumentError
 from enumsol.model.problem import check_is_problem
 from enumsol.support.arguments import alpha_value, optional_callable

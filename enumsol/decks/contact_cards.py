@@ -83,7 +83,7 @@ def friction(reading: Reading, given: Card) -> str:
     *("CONTACT PAIR", "INTERACTION", "ADJUST", "TIED", "SMALL SLIDING"),
     unused=(
         *("TYPE", "TRACKING", "NO THICKNESS", "HCRIT", "EXTENSION ZONE", "SMOOTH", "SUPPLEMENTARY CONSTRAINTS"),
-        *("MECHANICAL CONSTRAINT", "CPSET", "WEIGHT", "OP"),
+        *("MECHANICAL CONSTRAINT", "CPSET", "WEIGHT", "OP", "SLIDING TRANSITION", "MINIMUM DISTANCE"),
     ),
 )
 def contact_pair(reading: Reading, given: Card) -> str:
@@ -104,6 +104,46 @@ def contact_pair(reading: Reading, given: Card) -> str:
     if distance is not None:
         said.append(f"gaps {f'of {distance}' if isinstance(distance, str) else f'up to {distance:g}'} are closed")
     return "; ".join(said)
+
+
+@card("CONTACT", unused=("OP",))
+def contact(reading: Reading, given: Card) -> str:
+    """*CONTACT: the cards after it name the surfaces that may touch; without friction unless one says so."""
+    if reading.analysis.steps:
+        raise given.refused("stands in a step; expected contacts before the first *STEP")
+    reading.analysis.interactions.setdefault("", Interaction(given.place))
+    return "contacts of the pairs that cards after it name"
+
+
+@card("CONTACT INCLUSIONS", "ALL EXTERIOR")
+def contact_inclusions(reading: Reading, given: Card) -> str:
+    """*CONTACT INCLUSIONS: pairs of surfaces; overlaps of the geometry are taken away first, as Abaqus does."""
+    if "ALL EXTERIOR" in given.options or not given.data:
+        raise given.refused("has ALL EXTERIOR; expected the surfaces that may touch, two in a line, as in 'UNDER, ON'")
+    for row, entries in given.rows():
+        slave, master = [*map(key, entries), "", ""][:2]
+        if "" not in reading.analysis.interactions or not slave or not master or slave == master:
+            raise given.refused(f"has {slave}:{master}; expected two named surfaces behind *CONTACT", row)
+        reading.analysis.pairs.append(ContactPair(given.at(row), slave, master, "", 0.0, is_included=True))
+    return "nodes of the first surface against facets of the second, with small sliding; overlaps are taken away"
+
+
+@card("CONTACT PROPERTY ASSIGNMENT")
+def contact_property_assignment(reading: Reading, given: Card) -> str:
+    """*CONTACT PROPERTY ASSIGNMENT: the interaction of pairs of *CONTACT INCLUSIONS, of all or of one."""
+    pairs = reading.analysis.pairs
+    for row, entries in given.rows():
+        one, two, name = [*map(key, entries), "", "", ""][:3]
+        own = [
+            k for k, pair in enumerate(pairs) if pair.is_included and {one, two} in ({""}, {pair.slave, pair.master})
+        ]
+        if not own or not name:
+            raise given.refused(
+                f"gives {name or 'nothing'} to {one}:{two}; expected a pair of *CONTACT INCLUSIONS", row
+            )
+        for k in own:
+            pairs[k] = replace(pairs[k], interaction=name)
+    return "contact properties of these pairs"
 
 
 @card("CLEARANCE", "SLAVE", "MASTER", "VALUE", unused=("CPSET",))

@@ -9,7 +9,7 @@ import numpy as np
 from enumsol.decks.cards import Card, is_number
 from enumsol.decks.elements import element_type
 from enumsol.decks.model import DeckRegion, ElementBlock, Members, RigidProfile
-from enumsol.decks.registry import Reading, card, harmless
+from enumsol.decks.registry import Reading, card, harmless, refused
 from enumsol.support.messages import counted
 
 harmless("it asks for output", *(
@@ -18,16 +18,8 @@ harmless("it asks for output", *(
     "ENERGY PRINT", "ENERGY OUTPUT", "PRINT", "FILE OUTPUT", "INTEGRATED OUTPUT", "DIAGNOSTICS", "FACE PRINT",
 ))  # fmt: skip
 mesh_card = partial(card, of_mesh=True)
-#: Cards that make or move nodes or elements.
-_MAKERS = ("NGEN", "NFILL", "NCOPY", "NMAP", "ELGEN", "ELCOPY", "SYSTEM")
-
-
-def _refused_maker(reading: Reading, given: Card) -> str | None:
-    raise given.refused("makes or moves nodes or elements, which is not read; expected all of them written out")
-
-
-for _name in _MAKERS:
-    mesh_card(_name, *("NSET", "LINE", "NEW SET", "OLD SET", "CHANGE NUMBER", "ELSET", "SHIFT"))(_refused_maker)
+refused("makes or moves nodes, which are to be written out", "to leave all nodes where they are", "NMAP", "SYSTEM",
+        of_mesh=True)  # fmt: skip
 
 
 @mesh_card("HEADING", "UNSYMMETRIC AXISYMMETRIC", "SPARSE")

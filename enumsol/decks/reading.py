@@ -6,7 +6,7 @@ from collections.abc import Collection
 from pathlib import Path
 
 # the modules that fill the table of cards
-from enumsol.decks import constraint_cards, contact_cards, material_cards, mesh_cards, step_cards  # noqa: F401
+from enumsol.decks import constraint_cards, contact_cards, making_cards, material_cards, mesh_cards, step_cards  # noqa: F401
 from enumsol.decks.assembly import put_together
 from enumsol.decks.cards import cards_of
 from enumsol.decks.model import Deck

@@ -73,7 +73,7 @@ class Reading:
         name = compact(card.name)
         is_known = any(name in table for table in (CARDS, HARMLESS, REFUSED))
         close = [] if is_known else difflib.get_close_matches(name, CARDS, n=1, cutoff=0.87)
-        if self.bare and not any(CARDS[own].of_mesh for own in (name, *close) if own in CARDS):
+        if self.bare and not any(own in OF_MESH for own in (name, *close)):
             return
         if name in self.ignore:
             self.account(card, "not used, as you say", used=False)
@@ -102,12 +102,11 @@ class Reading:
 
 @dataclass(frozen=True)
 class Rule:
-    """A function that reads a card, options that it knows, those that change nothing, and whether it is of the mesh."""
+    """A function that reads a card, options that it knows, and those that change nothing."""
 
     read: Reader
     options: frozenset[str]
     passed: frozenset[str]
-    of_mesh: bool
 
 
 #: Cards that are read, by their names without blanks.
@@ -123,7 +122,8 @@ def card(name: str, *options: str, unused: Collection[str] = (), of_mesh: bool =
 
     def entered(read: Reader) -> Reader:
         passed = frozenset(map(compact, unused))
-        CARDS[compact(name)] = Rule(read, passed.union(map(compact, options)), passed, of_mesh)
+        CARDS[compact(name)] = Rule(read, passed.union(map(compact, options)), passed)
+        OF_MESH.update([compact(name)] if of_mesh else ())
         return read
 
     return entered
@@ -134,9 +134,14 @@ def harmless(reason: str, *names: str) -> None:
     HARMLESS.update({compact(name): reason for name in names})
 
 
-def refused(found: str, without: str, *names: str) -> None:
+#: Cards of either kind that a mesh alone depends on.
+OF_MESH: set[str] = set()
+
+
+def refused(found: str, without: str, *names: str, of_mesh: bool = False) -> None:
     """Enter cards that are refused: what they are, and what leaving them out means."""
     REFUSED.update({compact(name): (found, without) for name in names})
+    OF_MESH.update(map(compact, names if of_mesh else ()))
 
 
 def compact(name: str) -> str:

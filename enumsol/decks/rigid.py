@@ -33,11 +33,16 @@ def add_profiles(deck: Deck, profiles: dict[str, RigidProfile]) -> None:
     Raises
     ------
     InvalidArgumentError
-        A profile of the plane is given in 3D, or the other way round.
+        A profile belongs to no rigid body, or one of the plane is given in 3D, or the other way round.
     """
     spatial = deck.dimension == 3
     far = float(np.linalg.norm(np.ptp(deck.points, axis=0))) if len(deck.points) else 1.0
+    bodies = {coupling.target for coupling in deck.analysis.couplings if coupling.card == "RIGID BODY"}
     for name, profile in profiles.items():
+        if name not in bodies:
+            raise InvalidArgumentError(
+                f"{profile.place}: *SURFACE {name} is of no *RIGID BODY; expected one with ANALYTICAL SURFACE={name}"
+            )
         if profile.is_swept != spatial:
             expected = "TYPE=CYLINDER" if spatial else "TYPE=SEGMENTS"
             raise InvalidArgumentError(

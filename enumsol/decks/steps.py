@@ -139,6 +139,8 @@ class ContactPair:
         Replaces the distances of the geometry [length].
     tied : bool
         Whether the two stay joined.
+    is_included : bool
+        Whether *CONTACT INCLUSIONS names it, and a later card gives its interaction.
     """
 
     place: DeckPlace
@@ -148,6 +150,7 @@ class ContactPair:
     adjust: float | str | None = None
     clearance: float | None = None
     tied: bool = False
+    is_included: bool = False
 
 
 @dataclass(frozen=True)

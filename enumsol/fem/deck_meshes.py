@@ -95,6 +95,7 @@ def deck_mesh(deck: Deck, *, spelled: bool = False) -> DeckMesh:
     InvalidArgumentError
         There are no bodies, or elements of another kind that carry something, or of which something is lost.
     """
+    refuse_carriers(deck)
     bodies, shapes = _bodies(deck)
     types = () if shapes else dict.fromkeys(deck.blocks[k].type.name for k in bodies)
     of = deck.spelled if spelled else {}
@@ -123,13 +124,10 @@ def _facets(deck: Deck, bodies: list[int], firsts: Integers) -> dict[str, Intege
     If no set names any of the elements that carry none, all of them are there without a name.
     """
     dimension = deck.blocks[bodies[0]].type.shape.dimension
-    covered = np.zeros(len(deck.points), dtype=bool)
-    for k in bodies:
-        covered[deck.blocks[k].nodes] = True
+    covered = _covered(deck, bodies)
     carriers = np.zeros(firsts[-1], dtype=bool)
     for k, block in enumerate(deck.blocks):
         if k not in bodies:
-            _check_carrier(deck, block, int(firsts[k]), dimension, covered)
             own = np.all(covered[block.nodes], axis=1) & (block.type.shape.dimension == dimension - 1)
             carriers[firsts[k] : firsts[k + 1]] = own
     found = {name: _themselves(rows[carriers[rows]]) for name, rows in deck.element_sets.items()}
@@ -137,6 +135,30 @@ def _facets(deck: Deck, bodies: list[int], firsts: Integers) -> dict[str, Intege
     if np.any(carriers) and not found:
         found = {"": _themselves(np.flatnonzero(carriers))}
     return found | {name: own.faces for name, own in deck.surfaces.items() if own.nodes is None}
+
+
+def _covered(deck: Deck, bodies: list[int]) -> Mask:
+    """Which nodes belong to some blocks."""
+    covered = np.zeros(len(deck.points), dtype=bool)
+    for k in bodies:
+        covered[deck.blocks[k].nodes] = True
+    return covered
+
+
+def refuse_carriers(deck: Deck) -> None:
+    """Refuse elements that are no bodies and carry something, such as shells, and decks without bodies.
+
+    Raises
+    ------
+    InvalidArgumentError
+        It names a type and a line.
+    """
+    bodies, _ = _bodies(deck)
+    first, covered = 0, _covered(deck, bodies)
+    for k, block in enumerate(deck.blocks):
+        if k not in bodies:
+            _check_carrier(deck, block, first, deck.blocks[bodies[0]].type.shape.dimension, covered)
+        first += len(block.labels)
 
 
 def _themselves(rows: Integers) -> Integers:

@@ -18,6 +18,7 @@ from enumsol.decks.reading import described
 from enumsol.decks.states import states_of
 from enumsol.errors import InvalidArgumentError, InvalidProblemError
 from enumsol.fem.deck_joints import DeckJoints
+from enumsol.fem.deck_meshes import refuse_carriers
 from enumsol.fem.deck_options import acting, contacts, is_plane, shared
 from enumsol.fem.deck_parts import DeckParts
 from enumsol.fem.deck_stiffness import CODES, with_calculix
@@ -168,6 +169,7 @@ class DeckModel:
             )
         if not steps[-1].ended:
             raise InvalidArgumentError(f"{steps[-1].place}: *STEP has no *END STEP; expected it")
+        refuse_carriers(self.deck)
         return states_of(self.deck)
 
     @property

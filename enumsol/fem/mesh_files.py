@@ -9,7 +9,7 @@ import contextlib
 import io
 import os
 import warnings
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from pathlib import Path
 from types import MappingProxyType, ModuleType
 from typing import TYPE_CHECKING, Any, cast
@@ -40,7 +40,9 @@ _NUMBERS = ("medit:ref", "su2:tag", "CellEntityIds")
 _DECK = ".inp"
 
 
-def read_mesh(source: str | os.PathLike[str] | Any, groups: str | None = None) -> PartedMesh:
+def read_mesh(
+    source: str | os.PathLike[str] | Any, groups: str | None = None, *, ignore: Collection[str] = ()
+) -> PartedMesh:
     """Mesh of a body in 2D or 3D with its named parts, from a file that meshio reads or from a meshio.Mesh.
 
     In 2D the cells are triangles and quadrilaterals, of first or of second order (6, 8 or 9 nodes), in 3D tetrahedra,
@@ -63,6 +65,8 @@ def read_mesh(source: str | os.PathLike[str] | Any, groups: str | None = None) -
         (.inp), which is read without meshio. Its surfaces, and sets of elements that only lie on a body, are facets.
     groups : str or None
         Name of cell data (integers) by which facets and cells are grouped instead, for formats without named groups.
+    ignore : collection of str
+        Cards and types of elements of a deck that are left out, such as ``["S4"]``.
 
     Raises
     ------
@@ -83,7 +87,7 @@ def read_mesh(source: str | os.PathLike[str] | Any, groups: str | None = None) -
       cells   1 quadrilaterals
       facets  floor (1), wall (1)
     """
-    return _read(source, groups, None)
+    return _read(source, groups, None, ignore)
 
 
 def read_solid(source: str | os.PathLike[str] | Any, groups: str | None = None) -> SolidMesh:
@@ -112,9 +116,11 @@ def read_solid(source: str | os.PathLike[str] | Any, groups: str | None = None) 
     return cast("SolidMesh", _read(source, groups, 3))
 
 
-def _read(source: object, groups: str | None, dimension: int | None) -> PartedMesh:
+def _read(source: object, groups: str | None, dimension: int | None, ignore: Collection[str] = ()) -> PartedMesh:
     if isinstance(source, str | os.PathLike) and Path(source).suffix.lower() == _DECK:
-        return _of_deck(file_path(source, "source"), groups, dimension)
+        return _of_deck(file_path(source, "source"), groups, dimension, ignore)
+    if ignore:
+        raise InvalidArgumentError(f"ignore is {shown(ignore)} for a mesh that is no deck; expected an .inp file")
     meshio = MissingDependencyError.imported("meshio", "Meshes in files", "meshes")
     if isinstance(source, meshio.Mesh):
         return _checked(source, groups, dimension, None, "")
@@ -150,12 +156,12 @@ def _by_meshio(meshio: ModuleType, place: Path) -> tuple[meshio.Mesh, str]:
         ) from error
 
 
-def _of_deck(place: Path, groups: str | None, dimension: int | None) -> PartedMesh:
+def _of_deck(place: Path, groups: str | None, dimension: int | None, ignore: Collection[str]) -> PartedMesh:
     """Mesh of a deck, which has no cell data to group by."""
     from enumsol.decks.reading import described  # not for other files
 
     try:
-        return _parted(deck_mesh(described(place, bare=True), spelled=True), groups, dimension)
+        return _parted(deck_mesh(described(place, ignore=ignore, bare=True), spelled=True), groups, dimension)
     except InvalidArgumentError as error:
         raise InvalidArgumentError(f"{place}: {error}") from error
 

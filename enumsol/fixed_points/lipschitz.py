@@ -9,7 +9,7 @@ import numpy as np
 import scipy.sparse as sp
 from scipy.linalg import eigh
 
-from enumsol.condensation.condensed import RHS_BLOCK
+from enumsol.condensation.factorization import RHS_BLOCK
 from enumsol.errors import InvalidArgumentError
 from enumsol.fixed_points.system import ContactSystem, checked_problem
 from enumsol.fixed_points.tresca import node_values

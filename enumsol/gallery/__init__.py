@@ -8,15 +8,18 @@ there; `get` finds one by name.
 from enumsol.gallery.catalogue import GALLERY, GalleryEntry, close_names, get
 from enumsol.gallery.machine_parts import brake_shoe, clip, dovetail, lap_joint, pressed_rings
 from enumsol.gallery.problems import (
+    block3d,
     block_on_table,
+    block_on_table3d,
     chain,
     clamped_block,
+    one_node_3d,
     one_node_triangle,
     taper,
     two_node_square,
     wedge,
+    wedge3d,
 )
-from enumsol.gallery.solid_gallery import block3d, block_on_table3d, one_node_3d, wedge3d
 
 __all__ = [
     "GALLERY",

@@ -9,15 +9,17 @@ from typing import TYPE_CHECKING
 
 from enumsol.gallery.machine_parts import brake_shoe, clip, dovetail, lap_joint, pressed_rings
 from enumsol.gallery.problems import (
+    block3d,
     block_on_table,
     chain,
     clamped_block,
+    one_node_3d,
     one_node_triangle,
     taper,
     two_node_square,
     wedge,
+    wedge3d,
 )
-from enumsol.gallery.solid_gallery import block3d, one_node_3d, wedge3d
 from enumsol.support import arguments
 
 if TYPE_CHECKING:

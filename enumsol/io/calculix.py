@@ -14,7 +14,7 @@ from enumsol.errors import InvalidArgumentError
 from enumsol.io.vtu import SolvedState, pictures_of
 from enumsol.support.arguments import file_path
 from enumsol.support.array_types import Floats, Integers
-from enumsol.support.files import write_file, writing
+from enumsol.support.files import reading, write_file, writing
 from enumsol.support.messages import counted
 
 if TYPE_CHECKING:
@@ -173,14 +173,11 @@ def read_results(path: str | os.PathLike[str]) -> list[NodalResult]:
     if place.suffix.lower() not in readers:
         raise InvalidArgumentError(f"{place} is no result file; expected a name that ends in .frd or .dat")
     try:
-        with place.open(encoding="latin-1") as lines:
+        with reading(place, "results", "CalculiX"), place.open(encoding="latin-1") as lines:
             found = list(readers[place.suffix.lower()](lines))
-    except OSError as error:
-        raise InvalidArgumentError(f"{place} cannot be read ({error.strerror}); expected a file of CalculiX") from error
     except InvalidArgumentError as error:
-        raise InvalidArgumentError(f"{place}: {error}") from error
-    except (ValueError, IndexError) as error:
-        raise InvalidArgumentError(f"{place} is damaged ({error}); expected a result file of CalculiX") from error
+        named = str(error).startswith(str(place))
+        raise error if named else InvalidArgumentError(f"{place}: {error}") from error
     if not found:
         output = "*NODE FILE" if place.suffix.lower() == ".frd" else "*NODE PRINT"
         raise InvalidArgumentError(f"{place} has no displacements; expected the output of {output} with U")

@@ -39,7 +39,7 @@ if TYPE_CHECKING:
     from enumsol.trusted.at_alpha import JointRoot
     from enumsol.trusted.over_interval import EnclosedPiece
     from enumsol.trusted.quadratic_forms import EnclosedForm
-    from enumsol.trusted.reference import Reference
+    from enumsol.trusted.reference import PlaneReference
     from enumsol.trusted.space.pieces import AlphaPiece
     from enumsol.trusted.space.sector_margins import SlipForm
     from enumsol.trusted.space.space_uniqueness import LeafReference
@@ -469,8 +469,8 @@ class OnlyReference(ClosingRecord):
             raise RecordError("its rows are not numbers of rows")
         return row
 
-    def holds(self, known: Reference | LeafReference, codes: Codes, reach: Floats) -> bool:
-        """True if no other root lies below the assignment than that of a form, a Reference or LeafReference.
+    def holds(self, known: PlaneReference | LeafReference, codes: Codes, reach: Floats) -> bool:
+        """True if no other root lies below the assignment than that of a form, a PlaneReference or LeafReference.
 
         ``reach``: within these bounds of the rigid displacement (theory, sections 14.11 and 14.15).
         """

@@ -213,16 +213,16 @@ def numbers_from(values: object, size: int) -> Floats:
     return numbers
 
 
-def codes_from(texts: object, p: int) -> NDArray[np.uint8]:
-    """Status codes, (k, p), from k texts of p digits each."""
+def codes_from(texts: object, p: int, most: int = UNDECIDED) -> NDArray[np.uint8]:
+    """Status codes up to ``most``, (k, p), from k texts of p digits each."""
     if not isinstance(texts, list) or not all(isinstance(text, str) and len(text) == p for text in texts):
         raise ValueError(f"expected status codes as texts of {p} digits")
     joined = "".join(texts)
     if not joined.isascii():
         raise ValueError("a status code is not a digit")
     codes = np.frombuffer(joined.encode("ascii"), dtype=np.uint8) - np.uint8(ord("0"))
-    if np.any(codes > UNDECIDED):
-        raise ValueError(f"a status code is not among 0 to {UNDECIDED}")
+    if np.any(codes > most):
+        raise ValueError(f"a status code is not among 0 to {most}")
     return codes.reshape(-1, p)
 
 

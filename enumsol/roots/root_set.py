@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     from enumsol.model.mesh import BodyMesh
     from enumsol.model.statuses import ContactStatus
     from enumsol.proof.proof_file import Proof
-    from enumsol.roots.stability import Stability
+    from enumsol.roots.stability import Stabilities, Stability
     from enumsol.search.certifiers.protocol import Escalations
     from enumsol.support.array_types import Alpha, ArrayLike, Floats
 
@@ -254,7 +254,7 @@ class RootSet(Sequence[Root], Immutable):
         self.certified_data = certified_data
         self.proof = proof
         self.rigid_bound = rigid_bound
-        self._found: dict[str, tuple[Stability, ...]] = {}
+        self._found: dict[str, Any] = {}
         self._freeze()
 
     def stability(self, *, mass: ArrayLike | sp.sparray | sp.spmatrix | None = None) -> tuple[Stability, ...]:
@@ -274,18 +274,22 @@ class RootSet(Sequence[Root], Immutable):
         InvalidArgumentError, InvalidProblemError
             As `enumsol.stability`.
         """
-        from enumsol.roots.stability import Stabilities  # sparse graphs and solvers come with it
-
         if not len(self):
             self._found["verdicts"] = ()
             return ()
-        if mass is not None or "own" not in self._found:
-            asked = Stabilities(self[0].problem, mass)
-            found = tuple(asked.of(root) for root in self)
-            self._found["own" if mass is None else "verdicts"] = found
+        return self._examined(mass)[1]
+
+    def _examined(self, mass: ArrayLike | sp.sparray | sp.spmatrix | None) -> tuple[Stabilities, tuple[Stability, ...]]:
+        """What proves the verdicts, and all of these; for the mass of the problem both are kept."""
+        from enumsol.roots.stability import Stabilities  # sparse graphs and solvers come with it
+
+        verdicts, known = self._found.get("own", (None, None)) if mass is None else (None, None)
+        asked = Stabilities(self[0].problem, mass, known)
+        found = tuple(asked.of(root) for root in self) if verdicts is None else verdicts
+        self._found["verdicts"] = found
         if mass is None:
-            self._found["verdicts"] = self._found["own"]
-        return self._found["verdicts"]
+            self._found["own"] = found, asked.known
+        return asked, found
 
     def stability_proof(
         self, path: str | Path | None = None, *, mass: ArrayLike | sp.sparray | sp.spmatrix | None = None
@@ -314,8 +318,7 @@ class RootSet(Sequence[Root], Immutable):
         >>> enumsol.verify(problem, proof).verdicts
         ('does not run away', 'runs away', 'does not run away')
         """
-        from enumsol.roots.stability import Stabilities  # as above
-        from enumsol.roots.stability_proof import write_proof
+        from enumsol.roots.stability_proof import write_proof  # as above
 
         if not len(self):
             raise InvalidArgumentError("there is no isolated root; expected one whose stability can be proven")
@@ -324,12 +327,7 @@ class RootSet(Sequence[Root], Immutable):
                 f"these roots ({self.arithmetic} arithmetic) have no proof; expected those of a search in verified "
                 "arithmetic that ran to its end"
             )
-        asked = Stabilities(self[0].problem, mass)
-        found = tuple(asked.of(root) for root in self)
-        self._found["verdicts"] = found
-        if mass is None:
-            self._found["own"] = found
-        return write_proof(self.proof, self, asked, path)
+        return write_proof(self.proof, self, *self._examined(mass), path)
 
     @property
     def verdicts(self) -> tuple[Stability, ...] | None:

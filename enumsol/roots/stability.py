@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+import hashlib
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 import scipy.sparse as sp
@@ -15,7 +16,7 @@ from enumsol.support.arguments import shown
 from enumsol.support.immutable import Sealed
 from enumsol.support.messages import counted
 from enumsol.trusted.motions_of_body import BodyMotions, Setting, friction_directions, friction_over
-from enumsol.trusted.running_away import Motion, everywhere
+from enumsol.trusted.running_away import Motion, left_open
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
@@ -176,6 +177,8 @@ class Stabilities(Equilibria):
     problem : ContactProblem or ContactProblem3D
     mass : (n, n) array_like or sparse, or None
         In place of ``problem.inertia``.
+    known : dict, optional
+        What was proven with this mass before.
 
     Raises
     ------
@@ -185,9 +188,14 @@ class Stabilities(Equilibria):
         There is none, or friction depends on the solution.
     """
 
-    def __init__(self, problem: AnyProblem, mass: ArrayLike | sp.sparray | sp.spmatrix | None = None) -> None:
+    def __init__(
+        self,
+        problem: AnyProblem,
+        mass: ArrayLike | sp.sparray | sp.spmatrix | None = None,
+        known: dict[bytes, Proven] | None = None,
+    ) -> None:
         super().__init__(problem, BodyMotions(problem, mass))
-        self._known: dict[Any, Proven] = {}
+        self.known = {} if known is None else known
 
     def of(self, root: Root) -> Stability:
         """The verdict on one root."""
@@ -199,8 +207,8 @@ class Stabilities(Equilibria):
         for setting, proven in self.examined(root):
             limits += len(setting.limits)
             gaps += proven.gaps
-            if not (proven.growing or proven.gaps or everywhere(proven.ranges)):
-                gaps.append((0.0, np.inf))
+            if not proven.growing and not proven.gaps and (ends := left_open(proven.leaves)) is not None:
+                gaps.append(ends)
             for _, motion in proven.growing:
                 rate = float(np.sqrt(0.5 * sum(motion.mu)))
                 found.append((rate, rate_bounds(*motion.mu), self._shape(setting, motion)))
@@ -225,13 +233,13 @@ class Stabilities(Equilibria):
 
     def _proven(self, setting: Setting) -> Proven:
         """Proofs about one part: the same for all roots with these nodes, friction and directions."""
-        F, moves = setting.motions.slopes, setting.motions.moves
-        leaning = tuple((float(node.F.mid), float(node.F.rad)) for node in setting.motions.touching)
-        arrays = (part.tobytes() for part in (F.mid, F.rad, moves.mid, moves.rad))
-        key = (tuple(setting.rows), setting.motions.unsure, leaning, *arrays)
-        if key not in self._known:
-            self._known[key] = StabilitySearch(setting.stiffness, setting.motions).run()
-        return self._known[key]
+        motions = setting.motions
+        key = hashlib.sha256(repr((setting.rows, motions.unsure)).encode())
+        for part in (motions.slopes, motions.moves, *(node.F for node in motions.touching)):
+            key.update(part.mid.tobytes() + part.rad.tobytes())
+        if key.digest() not in self.known:
+            self.known[key.digest()] = StabilitySearch(setting.stiffness, motions).run()
+        return self.known[key.digest()]
 
     def _shape(self, setting: Setting, motion: Motion) -> Floats:
         """Displacements of a motion that grows, (n,), in floats."""

@@ -24,8 +24,10 @@ if TYPE_CHECKING:
     from enumsol.roots.stability import Stabilities, Stability
 
 
-def write_proof(proof: Proof, roots: Iterable[Root], asked: Stabilities, path: str | Path | None) -> Proof:
-    """The proof of verdicts on roots, after the ``proof`` of these.
+def write_proof(
+    proof: Proof, roots: Iterable[Root], asked: Stabilities, found: Iterable[Stability], path: str | Path | None
+) -> Proof:
+    """The proof of verdicts ``found`` on roots, after the ``proof`` of these.
 
     Raises
     ------
@@ -48,8 +50,8 @@ def write_proof(proof: Proof, roots: Iterable[Root], asked: Stabilities, path: s
     for record in records:
         writer.write(record)
     counts: Counter[str] = Counter()
-    for root in roots:
-        verdict, certificates = _certified(asked, root, asked.of(root))
+    for root, own in zip(roots, found, strict=True):
+        verdict, certificates = _certified(asked, root, own)
         counts[verdict] += 1
         writer.write(root_record(np.concatenate([root.lambda_n, np.asarray(root.lambda_t).T.ravel()]), verdict))
         for record in certificates:
@@ -72,8 +74,7 @@ def _certified(asked: Stabilities, root: Root, found: Stability) -> tuple[str, l
         return RUNS_AWAY, [certificate_record(k, certificate)]
     records = []
     for k, (_, proven) in enumerate(parts):
-        known = dict.fromkeys(leaf for _, _, leaves in proven.ranges for leaf in leaves)
-        records += [certificate_record(k, leaf) for leaf in known]
+        records += [certificate_record(k, leaf) for leaf in dict.fromkeys(proven.leaves)]
     return DOES_NOT, records
 
 

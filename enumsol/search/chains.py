@@ -5,6 +5,7 @@ Where the problem has one solution it is the whole graph (theory, section 7.15).
 
 from __future__ import annotations
 
+from copy import copy
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import TYPE_CHECKING
@@ -17,6 +18,8 @@ from enumsol.support.deadlines import look
 from enumsol.trusted.selection import Selection
 
 if TYPE_CHECKING:
+    from collections.abc import Callable
+
     from enumsol.condensation.condensed import CondensedProblem, ScaledSystem
     from enumsol.support.array_types import Codes, Floats
 
@@ -43,13 +46,28 @@ class LoadedSystem:
     units : ScaledSystem
         With the compliance and the units.
     side : 1.0 or -1.0 above or below an alpha at which g vanishes: the load is +-g1; else 0.0
+    start : callable, optional
+        Gives the selection of a root at an alpha, or None; by default it is sought as of a body that is held.
     """
 
-    def __init__(self, condensed: CondensedProblem, units: ScaledSystem, side: float) -> None:
+    def __init__(
+        self,
+        condensed: CondensedProblem,
+        units: ScaledSystem,
+        side: float,
+        start: Callable[[float], Codes | None] | None = None,
+    ) -> None:
         self.S, self._units = units.S, units
         self.F0, self.F1 = condensed.F0, condensed.F1
+        self.reach, self._start = np.zeros(0), start
         slope = condensed.g1 / units.length
         self.g0, self.g1 = (side * slope, np.zeros_like(slope)) if side else (condensed.g0 / units.length, slope)
+
+    def bordered(self, S: Floats, g: tuple[Floats, Floats], reach: Floats) -> LoadedSystem:
+        """The same of a body that nothing holds, by its matrix (14.9) and load and bounds of q."""
+        found = copy(self)
+        found.S, (found.g0, found.g1), found.reach = S, g, reach
+        return found
 
     @property
     def p(self) -> int:
@@ -60,6 +78,14 @@ class LoadedSystem:
         """The system at one alpha."""
         return replace(self._units, g=self.g0 + alpha * self.g1, F=np.maximum(self.F0 + alpha * self.F1, 0.0))
 
+    def selection(self, alpha: float) -> Codes | None:
+        """The selection of a root at an alpha, or None."""
+        if self._start is not None:
+            return self._start(alpha)
+        system, reduction = self.at(alpha), self.reduction(alpha)
+        found = reduction.solution((np.zeros(2 * system.p), system.g)) or reduction.solution(None)
+        return None if found is None else tuple(found[1])
+
     def reduction(self, alpha: float) -> Reduction:
         """The problem at one alpha with all nodes free."""
         return Reduction(self.at(alpha), (UNDECIDED,) * self.p, tuple(range(self.p)), {})
@@ -69,7 +95,7 @@ class SelectionCurve:
     """A selection's solution as a function of alpha."""
 
     def __init__(self, system: LoadedSystem, codes: Codes) -> None:
-        self._system, self.rows = system, Selection(codes)
+        self._system, self.rows = system, Selection(codes, len(system.reach))
         self._slope = self.rows.columns(system.S, system.F1, 0)
 
     def at(self, alpha: float) -> tuple[Floats, Floats, Floats, Floats, Floats, Floats]:
@@ -88,9 +114,10 @@ class SelectionCurve:
         dy = np.asarray(np.linalg.solve(M, system.g1[rows.unknown] - dW[rows.unknown] @ y))
         w, dw = g - W @ y, np.asarray(system.g1 - W @ dy - dW @ y)
         force, slope = rows.forces(y, F), rows.forces(dy, F) + rows.forces(y, F1, unit=0)
-        widens = np.zeros(len(rows.conditions))
-        widens[len(widens) - 2 * len(rows.stick) :] = np.tile(F1[rows.stick] * y[rows.stick_columns], 2)
-        return force, w, rows.slacks(y, w, F), slope, dw, rows.slacks(dy, dw, F) + widens
+        widens, cones = np.zeros(len(rows.conditions)), len(rows.moving) + len(rows.closed)
+        widens[cones : cones + 2 * len(rows.stick)] = np.tile(F1[rows.stick] * y[rows.stick_columns], 2)
+        bounds = (system.reach, 0.0 * system.reach) if len(system.reach) else (None, None)
+        return force, w, rows.slacks(y, w, F, bounds[0]), slope, dw, rows.slacks(dy, dw, F, bounds[1]) + widens
 
 
 class Chains:
@@ -127,7 +154,7 @@ class Chains:
         """The branch of the solution beside an alpha."""
         alpha = first + _BESIDE * (self._last - first)
         try:
-            codes = self._statuses(alpha)
+            codes = self.system.selection(alpha)
             found: list[Link] = []
             while codes is not None and len(found) < self._most:
                 look()
@@ -143,12 +170,6 @@ class Chains:
         except np.linalg.LinAlgError:
             pass
         return found
-
-    def _statuses(self, alpha: float) -> Codes | None:
-        system = self.system.at(alpha)
-        reduction = self.system.reduction(alpha)
-        found = reduction.solution((np.zeros(2 * system.p), system.g)) or reduction.solution(None)
-        return None if found is None else tuple(found[1])
 
     def _event(self, curve: SelectionCurve, alpha: float) -> tuple[float, int | None] | None:
         """Alpha at which a condition vanishes next, and which; the end of the interval and None where none does."""
@@ -172,6 +193,8 @@ class Chains:
     def _beyond(self, curve: SelectionCurve, alpha: float, condition: int) -> Codes | None:
         """The selection behind an event; None where the branch turns back."""
         node, kind = curve.rows.conditions[condition]
+        if node >= self.system.p:
+            return None  # the rigid displacement reaches its bound
         (code, _), *others = ACROSS[curve.rows.codes[node], kind]
         if others:
             slip = float(curve.at(alpha)[1][self.system.p + node])

@@ -8,12 +8,13 @@ such assignments first.
 from __future__ import annotations
 
 from functools import cached_property
-from typing import TYPE_CHECKING, Any, NamedTuple, Protocol
+from typing import TYPE_CHECKING, Any, NamedTuple, Protocol, TypeVar
 
 import numpy as np
 
 from enumsol.model.statuses import BACKWARD, FORWARD, OPEN, SLIP_MINUS, SLIP_PLUS, STICK, UNDECIDED
 from enumsol.search.closing import TreeCloser
+from enumsol.support.deadlines import look
 from enumsol.trusted.at_alpha import solve_selection
 from enumsol.trusted.selection import PENETRATION, SLIP_BACKWARD as BACK, SLIP_FORWARD as FORTH
 from enumsol.trusted.status_rows import FREE, row_signs
@@ -25,8 +26,10 @@ if TYPE_CHECKING:
     from enumsol.relaxation.engine import Relaxation
     from enumsol.search.certifiers.protocol import Led
     from enumsol.support.array_types import Codes, Floats
-    from enumsol.trusted.reference import Reference
+    from enumsol.trusted.reference import PlaneReference
 
+#: Why there is no root below an assignment.
+Why = TypeVar("Why")
 #: Factors of products that are tried, relative to the compliance.
 _FACTORS = np.geomspace(2.0**-8, 2.0**8, 17)
 #: Share of the certificates for single nodes and pairs from which the tree is led by them; so many are tried.
@@ -128,12 +131,12 @@ class LeadingCloser(ReferenceCloser):
     """Ends the tree in 2D where only a known root is left, and leads it there."""
 
     def __init__(self, certifier: Any, root: Callable[[], Codes | None]) -> None:
-        super().__init__(certifier, root, proposed)
+        super().__init__(certifier, root, lambda reference, codes: proposed([reference], codes))
 
     @cached_property
     def _cover(self) -> Cover | None:
         """Leads the tree where that pays."""
-        cover = None if self._reference is None else Cover(self._reference)
+        cover = None if self._reference is None else Cover([self._reference])
         return cover if cover is not None and cover.pays else None
 
     @property
@@ -156,7 +159,7 @@ class LeadingCloser(ReferenceCloser):
 
 
 #: mu of all nodes where kappa is one, and factors of |G d|^2, that are tried.
-_NUMBERS = tuple((mu, balance) for balance in (16.0, 1024.0) for mu in (1.0, 3.0, 10.0))
+NUMBERS = tuple((mu, balance) for balance in (16.0, 1024.0) for mu in (1.0, 3.0, 10.0))
 #: Of the gap of an open node, what at first may serve for its slip.
 _SHARED = 0.5
 
@@ -172,38 +175,44 @@ def reference_numbers(system: EnclosedSystem, selection: Codes) -> Iterator[tupl
     with np.errstate(divide="ignore", invalid="ignore"):
         stuck = np.clip(force[1] / (F * force[0]), -1.0, 1.0)
         needed = np.where(w_t != 0, -w_n / np.abs(F * w_t), 1.0)
-    for mu, balance in _NUMBERS:
+    for mu, balance in NUMBERS:
         apart = np.sign(w_t) * np.maximum(0.0, 1.0 - _SHARED * mu * needed)
         choices = [code == SLIP_PLUS, code == SLIP_MINUS, code == STICK]
         share = np.select(choices, [np.ones(p), -np.ones(p), stuck], apart)[own]
         yield np.concatenate([np.full(p, mu), np.ones(len(share)), np.zeros(len(share)), share]), balance, mu
 
 
-def proposed(reference: Reference, codes: Codes) -> OnlyRoot:
-    """All equations of an assignment, and if need be a product of opposite slips with the factor that is best."""
-    rows, forward, backward = rows_of(reference, codes)
+def proposed(references: Sequence[PlaneReference], codes: Codes) -> OnlyRoot:
+    """All equations of an assignment, and if need be a product of opposite slips with the factor that is best.
+
+    For one root, or for those along a branch.
+    """
+    rows, forward, backward = rows_of(references, codes)
     if not forward or not backward:
         return OnlyRoot(rows, [])
     pairs = [(one, other) for one in {forward[0], forward[-1]} for other in {backward[0], backward[-1]}]
-    found = [_factor(reference, rows, one, other) for one, other in pairs]
+    middle = references[len(references) // 2]
+    found = [_factor(middle, rows, one, other) for one, other in pairs]
     k = int(np.argmax([least for least, _ in found]))
     return OnlyRoot(rows, [(*pairs[k], found[k][1])] if found[k][0] > 0 else [])
 
 
-def rows_of(reference: Reference, codes: Codes) -> tuple[list[int], list[int], list[int]]:
+def rows_of(references: Sequence[PlaneReference], codes: Codes) -> tuple[list[int], list[int], list[int]]:
     """Rows on displacements that are equations, and tight ones of nodes that slip forward, and backward."""
-    p, F = reference.system.p, reference.system.F
-    signs, own = (row_signs(np.array(given), F) for given in (codes, reference.selection))
-    equal = (signs == FREE) & (own == FREE)
+    p, F = references[0].system.p, references[0].system.F
+    signs = row_signs(np.array(codes), F)
+    own = row_signs(np.array(list({one.selection for one in references})), F)
+    equal = (signs == FREE) & np.all(own == FREE, axis=0)
     rows = [int(kind * p + node) for kind in (PENETRATION, FORTH) for node in np.flatnonzero(equal[:, kind])]
     tight = list[list[int]]()
     for kind, other in ((FORTH, BACK), (BACK, FORTH)):
-        fits = (signs[:, kind] > 0) & ((own[:, kind] == FREE) | (own[:, other] > 0)) & (F > 0) & ~equal[:, kind]
+        opposed = np.all((own[..., kind] == FREE) | (own[..., other] > 0), axis=0)
+        fits = (signs[:, kind] > 0) & opposed & (F > 0) & ~equal[:, kind]
         tight.append([int(kind * p + node) for node in np.flatnonzero(fits)])
     return rows, tight[0], tight[1]
 
 
-def _factor(reference: Reference, rows: list[int], one: int, other: int) -> tuple[float, float]:
+def _factor(reference: PlaneReference, rows: list[int], one: int, other: int) -> tuple[float, float]:
     """The largest least eigenvalue of the small matrix with a product of two tight rows, and its factor."""
     M = reference.form.small_matrix(reference.rows(rows), reference.rows([one, other]), []).mid
     product = np.zeros_like(M)
@@ -220,17 +229,23 @@ class Cover:
 
     Parameters
     ----------
-    reference : Reference
+    references : sequence of PlaneReference
+        One, or those along a branch.
+    reach : (r,) array, optional
+        Bounds of q, by default those of the first system.
     """
 
-    def __init__(self, reference: Reference) -> None:
-        self._reference, selection = reference, np.array(reference.selection)
+    def __init__(self, references: Sequence[PlaneReference], reach: Floats | None = None) -> None:
+        self._references, reference = references, references[0]
+        self._reach = reference.system.reach if reach is None else reach
+        selection = np.array(list({one.selection for one in references}))
         forward = np.count_nonzero(selection == SLIP_PLUS) >= np.count_nonzero(selection == SLIP_MINUS)
         #: Codes of slip with and against the direction in which most nodes slip; with these, open as well.
         self._with, self._against = (SLIP_PLUS, SLIP_MINUS) if forward else (SLIP_MINUS, SLIP_PLUS)
         self._along, self._back = (FORWARD, BACKWARD) if forward else (BACKWARD, FORWARD)
-        self._first = np.flatnonzero(np.isin(selection, (STICK, self._against))).tolist()
-        self._second = np.flatnonzero(np.isin(selection, (STICK, self._with))).tolist()
+        sticks, *slips = (np.isin(selection, (STICK, code)) for code in (STICK, self._against, self._with))
+        self._first, self._second = (np.flatnonzero(np.all(either, axis=0)).tolist() for either in slips)
+        self._stick = np.flatnonzero(np.all(sticks, axis=0)).tolist()
         G, at = reference.system.rows.G.mid, reference.at
         self._normal = G[:, : reference.system.p].T
         self._tangential = np.where(at.tangential[:, None] >= 0, G[:, reference.system.p :].T, 0.0)
@@ -238,26 +253,58 @@ class Cover:
     @cached_property
     def pays(self) -> bool:
         """True if single nodes that stick, and pairs that slip in opposite directions, mostly leave no other root."""
-        p, stick = self._reference.system.p, [i for i in self._first if self._reference.selection[i] == STICK]
+        p, stick = self._references[0].system.p, self._stick
         if not stick:
             return False
         tried = [{i: STICK} for i in _some(stick)]
         tried += [{stick[0]: self._with, i: self._against} for i in _some(self._second) if i != stick[0]]
-        found = [self._closes(tuple(codes.get(i, UNDECIDED) for i in range(p))) for codes in tried]
+        found = [self._closed(tuple(codes.get(i, UNDECIDED) for i in range(p))) is not None for codes in tried]
         return sum(found) >= _WORTH * len(found)
 
-    def _closes(self, codes: Codes) -> bool:
-        proposal, reach = proposed(self._reference, codes), self._reference.system.reach
-        return self._reference.is_only_root(codes, proposal.rows, proposal.products, reach)
+    def _closed(self, codes: Codes) -> OnlyRoot | None:
+        """Why no other root lies below an assignment; None where that is not proven."""
+        with np.errstate(all="ignore"):
+            proposal = proposed(self._references, codes)
+        given = codes, proposal.rows, proposal.products, self._reach
+        alone = (one.is_only_root(*given) for one in self._references)
+        return proposal if all(alone) else None
+
+    def leaves(
+        self, excluded: Callable[[Codes], Why | None], searched: Callable[[Codes], list[tuple[Codes, Why]] | None]
+    ) -> list[tuple[Codes, OnlyRoot | Why]] | None:
+        """Assignments that cover all, with why no other root lies below each of them; None where that is not proven.
+
+        ``excluded`` gives a reason why there is none below an assignment, or None; ``searched`` the leaves of a tree
+        below it, with theirs.
+        """
+        whole = (UNDECIDED,) * self._references[0].system.p
+        if (alone := self._closed(whole)) is not None:
+            return [(whole, alone)]
+        found: list[tuple[Codes, OnlyRoot | Why]] = []
+        waiting = [whole] if self.pays else []
+        while waiting:
+            look()
+            codes = waiting.pop()
+            reason = (self._closed(codes) if self.is_due(codes) else None) or excluded(codes)
+            if reason is not None:
+                found.append((codes, reason))
+            elif (split := self.split(codes)) is not None:
+                node, children = split
+                waiting += [(*codes[:node], code, *codes[node + 1 :]) for code in children]
+            elif (below := searched(codes)) is not None:
+                found += below
+            else:
+                return None
+        return found or None
 
     def is_due(self, codes: Codes) -> bool:
         """True if an assignment may be one that leaves the root alone."""
-        rows, forward, backward = rows_of(self._reference, codes)
+        rows, forward, backward = rows_of(self._references, codes)
         return bool(forward and backward) or any(row >= FORTH * len(codes) for row in rows)
 
     def split(self, codes: Codes) -> tuple[int, list[int]] | None:
         """The node to split next, and how; None where nothing is gained by it."""
-        rows, *tight = rows_of(self._reference, codes)
+        rows, *tight = rows_of(self._references, codes)
         moved = tight[0 if self._with == SLIP_PLUS else 1]
         modes = self._left(rows)
         if not moved:
@@ -277,7 +324,7 @@ class Cover:
 
     def _left(self, rows: list[int]) -> Floats:
         """Rigid modes along which no equation changes, as columns."""
-        G, p = self._reference.system.rows.G.mid, self._reference.system.p
+        G, p = self._references[0].system.rows.G.mid, self._references[0].system.p
         fixed = np.array(
             [self._normal[row % p] if row // p == PENETRATION else self._tangential[row % p] for row in rows]
         )

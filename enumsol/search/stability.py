@@ -26,7 +26,7 @@ from enumsol.support.deadlines import look
 from enumsol.trusted.running_away import Growing, Motion, Motions, NoMotion
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
+    from collections.abc import Callable, Iterator
 
     from enumsol.condensation.dynamic import DynamicStiffness
     from enumsol.support.array_types import Floats, Integers
@@ -49,15 +49,15 @@ class Proven:
 
     Attributes
     ----------
-    ranges : tuple of (low, high, leaves)
-        In each nothing grows, by the certificates ``leaves``, which decide all nodes at their limit.
+    leaves : tuple of NoMotion
+        Certificates by which nothing grows, by range.
     growing : tuple of (certificate, Motion)
         By growth rate, the largest first.
     gaps : tuple of (low, high)
         Ranges of mu of which neither is proven.
     """
 
-    ranges: tuple[tuple[float, float, tuple[NoMotion, ...]], ...]
+    leaves: tuple[NoMotion, ...]
     growing: tuple[tuple[Growing, Motion], ...]
     gaps: tuple[tuple[float, float], ...]
 
@@ -70,11 +70,14 @@ class StabilitySearch:
     ----------
     stiffness : DynamicStiffness
     motions : Motions
+    most_programs : int
+        Semidefinite programs that are solved at most.
     """
 
     stiffness: DynamicStiffness
     motions: Motions
-    _ranges: list[tuple[float, float, tuple[NoMotion, ...]]] = field(default_factory=list)
+    most_programs: int = _PROGRAMS
+    _leaves: list[NoMotion] = field(default_factory=list)
     programs: int = 0
 
     def run(self) -> Proven:
@@ -87,8 +90,8 @@ class StabilitySearch:
         growing = [] if self.motions.unsure else [found for low, high in gaps for found in search.between(low, high)]
         growing.sort(key=lambda item: -item[0].low)
         if not growing and self._limit is not None:
-            gaps = [gap for low, high in gaps for gap in self._by_weights(low, high)]
-        return Proven(tuple(sorted(self._ranges, key=lambda item: item[0])), tuple(growing), tuple(_joined(gaps)))
+            gaps = [gap for ends in gaps for gap in self._divided(*ends, _NARROWEST, self._by_weights)]
+        return Proven(tuple(sorted(self._leaves, key=lambda leaf: leaf.low)), tuple(growing), tuple(_joined(gaps)))
 
     # -- plain numbers
 
@@ -101,7 +104,7 @@ class StabilitySearch:
                 return
             far = next((mu for mu in (STRIDE**2 * high, STRIDE * high) if self._serve_to(low, mu)), None)
             if far is None:
-                yield from self._halved(low, high)
+                yield from self._divided(low, high, _NARROW, self._by_plain)
             low = high if far is None else far
             high = low * STRIDE
             if self._limit is None and low > largest_eigenvalue(self.stiffness):
@@ -128,29 +131,31 @@ class StabilitySearch:
             return None
         return self._weights(self._limit, (), ())
 
-    def _halved(self, low: float, high: float) -> Iterator[tuple[float, float]]:
-        """Parts of a range in which plain numbers do not serve."""
+    def _divided(
+        self, low: float, high: float, narrow: float, proves: Callable[[float, float], bool | None]
+    ) -> Iterator[tuple[float, float]]:
+        """Parts of a range in which nothing is proven; ``proves`` gives None where shorter ones will not do either."""
         look()
+        proven = proves(low, high)
+        middle = None if proven is None else self._middle(low, high, narrow)
+        if middle is not None and not proven:
+            yield from self._divided(low, middle, narrow, proves)
+            yield from self._divided(middle, high, narrow, proves)
+        elif not proven:
+            yield low, high
+
+    def _by_plain(self, low: float, high: float) -> bool | None:
+        """Whether plain numbers serve in a range."""
         ends = [self.stiffness.at(mu) for mu in (low, high)]
         serving = [K is not None and serves(self.motions, K.mid) for K in ends]
-        if all(serving) and self._try(low, high):
-            return
-        if not any(serving):
-            yield low, high
-            return
-        middle = self._middle(low, high, _NARROW)
-        if middle is None:
-            yield low, high
-            return
-        yield from self._halved(low, middle)
-        yield from self._halved(middle, high)
+        return (all(serving) and self._try(low, high)) if any(serving) else None
 
     def _try(self, low: float, high: float, weights: Floats | None = None, products: Floats | None = None) -> bool:
         """True if some numbers serve in a range, which is then noted."""
         tried = self._certificate(low, high, weights, products)
         if tried is None:
             return False
-        self._ranges.append((low, high, (tried,)))
+        self._leaves.append(tried)
         return True
 
     def _certificate(
@@ -206,29 +211,21 @@ class StabilitySearch:
 
     # -- weights and products
 
-    def _by_weights(self, low: float, high: float) -> Iterator[tuple[float, float]]:
-        """Parts of a range in which weights and decided nodes do not serve either."""
-        look()
-        leaves = None
-        if self.programs < _PROGRAMS and low < high:
-            at = float(np.sqrt(max(low, 1e-3 * high) * high))
-            K = self._limit if np.isinf(high) else None if (own := self.stiffness.at(at)) is None else own.mid
-            leaves = None if K is None else self._decided(low, high, K, (), ())
-        if leaves is not None:
-            self._ranges.append((low, high, tuple(leaves)))
-            return
-        middle = None if self.programs >= _PROGRAMS else self._middle(low, high, _NARROWEST)
-        if middle is None:
-            yield low, high
-            return
-        yield from self._by_weights(low, middle)
-        yield from self._by_weights(middle, high)
+    def _by_weights(self, low: float, high: float) -> bool | None:
+        """Whether weights and decided nodes serve in a range."""
+        if self.programs >= self.most_programs:
+            return None
+        at = float(np.sqrt(max(low, 1e-3 * high) * high))
+        K = self._limit if np.isinf(high) else None if (own := self.stiffness.at(at)) is None else own.mid
+        leaves = None if K is None else self._decided(low, high, K, (), ())
+        self._leaves += leaves or []
+        return leaves is not None
 
     def _decided(
         self, low: float, high: float, K: Floats, slides: tuple[int, ...], stays: tuple[int, ...]
     ) -> list[NoMotion] | None:
         """Certificates for a range that decide nodes at their limit as far as it takes."""
-        if self.programs >= _PROGRAMS:
+        if self.programs >= self.most_programs:
             return None
         found = self._weights(K, slides, stays)
         if found is not None:

@@ -32,6 +32,7 @@ if TYPE_CHECKING:
 
     from enumsol.condensation.condensed import CondensedProblem
     from enumsol.model.problem import ContactProblem
+    from enumsol.proof.leaves import Excluded, OnlyReference, Unbalanced
     from enumsol.support.array_types import Codes, Floats
 
 
@@ -72,8 +73,8 @@ class SearchedPiece:
         Complete selections that survive: they may hold somewhere in the piece.
     cut : list of codes
         Subtrees that both halves of the piece take over as their roots; or that a search stopped early left.
-    numbers : PieceNumbers or None
-        Numbers with which the arcs of its selections hold all solutions: no tree was searched (theory, section 7.15).
+    closed : ClosedPiece or None
+        Why the arcs of its selections hold all solutions: no tree was searched (theory, sections 7.15 and 14.16).
     """
 
     piece: Piece
@@ -82,7 +83,27 @@ class SearchedPiece:
     empty: list[EmptyLeaf] = field(default_factory=list)
     selections: list[Codes] = field(default_factory=list)
     cut: list[Codes] = field(default_factory=list)
-    numbers: PieceNumbers | None = None
+    closed: ClosedPiece | None = None
+
+
+@dataclass(frozen=True)
+class ClosedPiece:
+    """A piece of which all solutions lie on the arcs of some selections.
+
+    Attributes
+    ----------
+    numbers : PieceNumbers
+    selections : sequence of codes
+    leaves : sequence of (codes, record)
+        Of a body that nothing holds, assignments that cover all, below which there is nothing else.
+    bounded : bool
+        That rests on the bound of its rigid displacement.
+    """
+
+    numbers: PieceNumbers
+    selections: Sequence[Codes]
+    leaves: Sequence[tuple[Codes, OnlyReference | Unbalanced | Excluded]] = ()
+    bounded: bool = False
 
 
 class IntervalCertifier:
@@ -105,6 +126,10 @@ class IntervalCertifier:
     def convex(self, piece: Piece, system: IntervalSystem, form: Floats) -> bool:
         """True if the form of these multipliers is proven convex on the piece."""
         return False
+
+    def needs_bound(self, piece: Piece, system: IntervalSystem, leaf: EmptyLeaf) -> bool:
+        """True unless a leaf is excluded without a bound of the rigid displacement."""
+        return True
 
 
 @dataclass(frozen=True)
@@ -216,8 +241,8 @@ class IntervalSearch:
     stopped : Stop or None
     selections : set of codes
         All complete selections that the trees could not exclude.
-    closed : mapping of Piece to (PieceNumbers, codes)
-        Pieces that need no tree: all their solutions lie on the arcs of these selections.
+    closed : mapping of Piece to ClosedPiece
+        Pieces that need no tree.
     checkable : bool
         Whether a checker can repeat what was excluded.
     """
@@ -241,7 +266,7 @@ class IntervalSearch:
         self.nodes = 0
         self.stopped: Stop | None = None
         self.selections: set[Codes] = set()
-        self.closed: Mapping[Piece, tuple[PieceNumbers, Sequence[Codes]]] = {}
+        self.closed: Mapping[Piece, ClosedPiece] = {}
         self.checkable = leaves.checkable
 
     def first(self) -> list[Task]:
@@ -280,7 +305,10 @@ class IntervalSearch:
             self.pieces.append(found)
             halves = self._in_halves(task)
             if task.piece in self.closed:
-                found.numbers, found.selections[:] = self.closed[task.piece]
+                found.closed = self.closed[task.piece]
+                found.selections[:] = found.closed.selections
+                if len(found.closed.leaves):
+                    found.system = self.worker.system(task.piece)
                 self.selections.update(found.selections)
                 cut = []
             elif halves:

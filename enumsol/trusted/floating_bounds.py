@@ -225,13 +225,13 @@ def is_confined(system: EnclosedSystem) -> bool:
         return False
 
 
-def motion_against(system: EnclosedSystem, codes: Sequence[int]) -> Floats:
+def motion_against(system: EnclosedSystem, codes: Sequence[int], other: EnclosedSystem | None = None) -> Floats:
     """A rigid motion against which the load works, and no forces of an assignment do, nor any that are near these.
 
     What is left of the load after its projection onto the cone of resultants G lambda, which is made wider by a share.
-    Whether it is one, ``is_unbalanced`` tells.
+    Whether it is one, ``is_unbalanced`` tells. With ``other`` for the forces at another alpha as well.
     """
-    return motion_beside(system, _rays(system, codes))
+    return motion_beside(system, [ray for end in (system, other) if end is not None for ray in _rays(end, codes)])
 
 
 def motion_beside(system: EnclosedSystem, resultants: Sequence[Floats]) -> Floats:

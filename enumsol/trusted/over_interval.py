@@ -12,12 +12,14 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from fractions import Fraction
+from functools import cached_property
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from enumsol.arithmetic.balls import SAFE, TINY, UNIT, Ball, factor_above, gamma, upper_norm
+from enumsol.arithmetic.balls import SAFE, TINY, UNIT, Ball, factor_above, gamma, hull, upper_norm
 from enumsol.condensation.enclosure import CondensedEnclosure, EnclosedSystem
+from enumsol.trusted.floating_bounds import without_bound
 from enumsol.trusted.quadratic_forms import EnclosedForm
 from enumsol.trusted.status_rows import BACKWARD, FORWARD, ROW_KINDS, STILL, UNDECIDED, row_table
 from enumsol.trusted.uniqueness_forms import Multipliers
@@ -100,6 +102,16 @@ class EnclosedPiece:
             forms = tuple(EnclosedForm.of(system, everything, multipliers, 0.0) for system in systems)
         return replace(self, forms=forms)
 
+    @cached_property
+    def unbounded(self) -> EnclosedPiece:
+        """The same of a body that nothing holds, with a bound beyond which there is no solution in the piece."""
+        first = self.ends[0]
+        g, h = hull([Ball(end.g, end.g_rad) for end in self.ends]), hull([end.rows.h for end in self.ends])
+        F = hull([Ball.exact(self.low), Ball.exact(self.high)])
+        whole = replace(first, g=g.mid, g_rad=g.rad, F=F.mid, F_rad=F.rad, rows=replace(first.rows, h=h))
+        reach = without_bound(whole).reach
+        return replace(self, ends=tuple(end.reaching(reach) for end in self.ends))
+
     def row_signs(self, codes: Indices) -> NDArray[np.int8]:
         """Signs that multipliers may have, (m, p, 9), for (partial) status codes (m, p)."""
         code = np.where((codes == UNDECIDED) & (self.high == 0), STILL, codes)
@@ -126,17 +138,24 @@ class PieceNumbers:
     ----------
     mu, kappa, nu : (p,) arrays
         mu and kappa positive; kappa and nu are read at nodes with friction only.
+    balance, share : float
+        Of a body that nothing holds, the factor of |G d|^2, and c of theory, (14.14).
+    degree : int
+        Of theta along an arc, as a polynomial.
     """
 
     mu: Floats
     kappa: Floats
     nu: Floats
+    balance: float = 0.0
+    share: float = 0.0
+    degree: int = 1
 
     @property
     def usable(self) -> bool:
         """True if they are numbers, and positive where they must be."""
-        finite = all(np.all(np.isfinite(part)) for part in (self.mu, self.kappa, self.nu))
-        return bool(finite and np.all(self.mu > 0) and np.all(self.kappa > 0))
+        finite = all(np.all(np.isfinite(part)) for part in (self.mu, self.kappa, self.nu, self.balance, self.share))
+        return bool(finite and np.all(self.mu > 0) and np.all(self.kappa > 0) and self.balance >= 0)
 
     def serve(self, largest: Floats) -> bool:
         """True if ``|nu| F <= mu`` for all coefficients up to these."""

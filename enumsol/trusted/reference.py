@@ -26,18 +26,53 @@ _OPPOSITE = {SLIP_FORWARD: SLIP_BACKWARD, SLIP_BACKWARD: SLIP_FORWARD}
 
 
 @dataclass(frozen=True)
-class Reference(RootReference[int]):
+class PlaneReference(RootReference[int]):
+    """Rows at the roots that a selection has in 2D, and their form, at one alpha or along an arc.
+
+    Attributes
+    ----------
+    at : Unknowns
+        Which components d has: lambda_n of all nodes, lambda_t of those with friction.
+    """
+
+    at: Unknowns
+
+    def allow(self, codes: Sequence[int], rows: Sequence[int], tight: Sequence[int]) -> bool:
+        """True if the first rows are equations, and the others nonnegative but not positive at the root."""
+        p, F = self.system.p, self.system.F
+        signs, own = (row_signs(np.array(given), F) for given in (codes, self.selection))
+        for row in (*rows, *tight):
+            kind, node = divmod(row, p)
+            if kind not in _SIGNS or (kind != PENETRATION and not F[node] > 0):
+                return False
+        for kind, node in (divmod(row, p) for row in rows):
+            if not signs[node, kind] == own[node, kind] == FREE:
+                return False
+        for kind, node in (divmod(row, p) for row in tight):
+            opposed = kind in _OPPOSITE and own[node, _OPPOSITE[kind]] == NONNEGATIVE
+            if signs[node, kind] < NONNEGATIVE or not (own[node, kind] == FREE or opposed):
+                return False
+        return True
+
+    def rows(self, rows: Sequence[int]) -> Ball:
+        """Rows as coefficients of the components of w that d has."""
+        found = np.zeros((len(rows), len(self.at.places)))
+        for k, row in enumerate(rows):
+            kind, node = divmod(row, self.system.p)
+            found[k, node if kind == PENETRATION else self.at.tangential[node]] = _SIGNS[kind]
+        return Ball.exact(found)
+
+
+@dataclass(frozen=True)
+class Reference(PlaneReference):
     """The strict root of a selection, and its form.
 
     Attributes
     ----------
     root : VerifiedSelection
-    at : Unknowns
-        Which components d has: lambda_n of all nodes, lambda_t of those with friction.
     """
 
     root: VerifiedSelection
-    at: Unknowns
 
     @classmethod
     def of(cls, system: EnclosedSystem, selection: Codes, weights: Floats, balance: float, share: float) -> Self | None:
@@ -70,33 +105,8 @@ class Reference(RootReference[int]):
             numbers = numbers.beside(x, at.tangential[at.normal])
             loaded = x, np.array(selection) != OPEN
             form = RootForm.of(S, G, numbers.multipliers(at), numbers.distances(at, x, w), loaded, balance, share)
-            return None if form is None else cls(system, tuple(selection), form, root, at)
+            return None if form is None else cls(system, tuple(selection), form, at, root)
 
     def lies_below(self, codes: Sequence[int]) -> bool:
         """True if the root has the statuses of an assignment."""
         return all(refines(own, code) for own, code in zip(self.selection, codes, strict=True))
-
-    def allow(self, codes: Sequence[int], rows: Sequence[int], tight: Sequence[int]) -> bool:
-        """True if the first rows are equations, and the others nonnegative but not positive at the root."""
-        p, F = self.system.p, self.system.F
-        signs, own = (row_signs(np.array(given), F) for given in (codes, self.selection))
-        for row in (*rows, *tight):
-            kind, node = divmod(row, p)
-            if kind not in _SIGNS or (kind != PENETRATION and not F[node] > 0):
-                return False
-        for kind, node in (divmod(row, p) for row in rows):
-            if not signs[node, kind] == own[node, kind] == FREE:
-                return False
-        for kind, node in (divmod(row, p) for row in tight):
-            opposed = kind in _OPPOSITE and own[node, _OPPOSITE[kind]] == NONNEGATIVE
-            if signs[node, kind] < NONNEGATIVE or not (own[node, kind] == FREE or opposed):
-                return False
-        return True
-
-    def rows(self, rows: Sequence[int]) -> Ball:
-        """Rows as coefficients of the components of w that d has."""
-        found = np.zeros((len(rows), len(self.at.places)))
-        for k, row in enumerate(rows):
-            kind, node = divmod(row, self.system.p)
-            found[k, node if kind == PENETRATION else self.at.tangential[node]] = _SIGNS[kind]
-        return Ball.exact(found)

@@ -546,16 +546,13 @@ def positive(Q: Ball) -> bool:
     return dense_eigenvalue_bound(Q.mid * scale) > float(upper_norm(Q.rad * scale + TINY)) * (1 + 2.0**-40)
 
 
-def everywhere(ranges: Sequence[tuple[float, float, Sequence[NoMotion]]]) -> bool:
-    """True if ranges (low, high, certificates that hold) leave no mu >= 0 and no way in which nodes slide or stay."""
-    reached = 0.0
-    for low, high, leaves in sorted(ranges, key=lambda item: item[0]):
-        if not low <= reached:
-            return False
+def left_open(leaves: Sequence[NoMotion]) -> tuple[float, float] | None:
+    """The first range of mu in which leaves, which hold, are not about every way; None if there is none."""
+    ends = sorted({0.0, np.inf, *(leaf.low for leaf in leaves), *(leaf.high for leaf in leaves)})
+    for low, high in itertools.pairwise(ends):
         if not covers([leaf for leaf in leaves if leaf.low <= low and high <= leaf.high]):
-            return False
-        reached = max(reached, high)
-    return reached == np.inf
+            return low, high
+    return None
 
 
 def covers(leaves: Sequence[NoMotion], most: int = MOST_WAYS) -> bool:

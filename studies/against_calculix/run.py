@@ -7,9 +7,13 @@ exactly; friction is Coulomb's in both, with a stiffness of stick in CalculiX.
 
 Read ``displacements``: the largest difference of the displacement of a node, in parts of the largest displacement; and
 ``forces``: the difference of the total contact force on the slab or the shaft (axisymmetric: along the axis), in parts
-of its size. They should fall with the size of the cells, down to what the penalty leaves. ``roots`` is the number of
-equilibria, all proven; ``audit`` whether the result of CalculiX was recognised as one of them. Needs CalculiX
-(``ccx``); without it its columns are empty.
+of its size. They should fall with the size of the cells, down to what the penalty leaves. ``displacements_same`` and
+``forces_same`` are these with the stiffness that CalculiX assembles (``assemble="ccx"``), so that contact alone
+differs: the thickness of its elements of plane stress is a displacement of their nodes, and its
+wedges have two points of integration. Tetrahedra of 10 nodes are the same elements; on their facets forces are at the
+nodes between corners here, and CalculiX spreads its penalty over the facets, which on facets as coarse as these is the
+difference. ``roots`` is the number of equilibria, all proven; ``audit`` whether the result of CalculiX was told to be
+one of them. Needs CalculiX (``ccx``); without it its columns are empty.
 """
 
 from __future__ import annotations
@@ -30,8 +34,27 @@ if TYPE_CHECKING:
     from shared.results import Run
 
 ABSENT = "CalculiX is not installed: its results are left out"
+#: Columns of what is compared with CalculiX.
+COMPARED = ("displacements", "forces", "audit", "displacements_same", "forces_same")
 #: Cells along the block.
 PLANE_SIZES, SOLID_SIZES = (2, 4, 8), (2, 4, 6)
+
+
+def solved(file, assemble=None):
+    """The model of a deck, its problem and all roots of it."""
+    model = enumsol.read_deck(file, assemble=assemble)
+    problem = model.problem()
+    return model, problem, enumsol.enumerate_roots(problem, 0)
+
+
+def differences(result, model, problem, roots, base):
+    """Shares by which displacements and total contact force of the nearest root differ, and if the audit found it."""
+    audit = enumsol.compare_result(problem, roots, result.on(problem.mesh, model.mesh.node_labels))
+    number = min(audit.distances, key=audit.distances.__getitem__)
+    ours = total(problem, roots[number[1]])
+    if model.scene().body.axisymmetric:  # CalculiX has a slice of two degrees
+        ours, base = ours[1:], 180.0 * base[1:]
+    return audit.distances[number], float(np.linalg.norm(ours + base) / np.linalg.norm(ours)), audit.found is not None
 
 
 def compared(name, cells, folder):
@@ -39,9 +62,7 @@ def compared(name, cells, folder):
     make, kind = CASES[name]
     file = Path(folder) / f"{name.replace(' ', '_')}_{cells}.inp"
     file.write_text(make(kind, cells))
-    model = enumsol.read_deck(file)
-    problem = model.problem()
-    roots = enumsol.enumerate_roots(problem, 0)
+    model, problem, roots = solved(file)
     row = {
         "deck": name,
         "cells": cells,
@@ -51,21 +72,15 @@ def compared(name, cells, folder):
         "complete": roots.complete,
     }
     if shutil.which("ccx") is None:
-        return row | {"displacements": "-", "forces": "-", "audit": "-"}
+        return row | dict.fromkeys(COMPARED, "-")
     done = subprocess.run(["ccx", file.stem], cwd=folder, capture_output=True, text=True, check=False)
     if "Job finished" not in done.stdout or "ERROR" in done.stdout:
-        return row | {"displacements": "-", "forces": "-", "audit": "CalculiX found no result"}
+        return row | dict.fromkeys(COMPARED, "-") | {"audit": "CalculiX found no result"}
     result = enumsol.read_results(file.with_suffix(".dat"))[-1]
-    audit = enumsol.compare_result(problem, roots, result.on(problem.mesh, model.mesh.node_labels))
-    number = min(audit.distances, key=audit.distances.__getitem__)
-    ours, theirs = total(problem, roots[number[1]]), reaction(file.with_suffix(".dat"), problem.mesh.points.shape[1])
-    if "CAX" in kind:  # CalculiX has a slice of two degrees
-        ours, theirs = ours[1:], 180.0 * theirs[1:]
-    return row | {
-        "displacements": audit.distances[number],
-        "forces": float(np.linalg.norm(ours + theirs) / np.linalg.norm(ours)),
-        "audit": audit.found is not None,
-    }
+    base = reaction(file.with_suffix(".dat"), problem.mesh.points.shape[1])
+    moved, pushed, found = differences(result, model, problem, roots, base)
+    alike = differences(result, *solved(file, "ccx"), base)
+    return row | dict(zip(COMPARED, (moved, pushed, found, *alike[:2]), strict=True))
 
 
 def total(problem, root):
@@ -90,14 +105,18 @@ def conclusion(rows):
         return ABSENT
     by_deck = {}
     for row in rows:
-        by_deck.setdefault(row["deck"], []).append((row["displacements"], row["forces"]))
+        by_deck.setdefault(row["deck"], []).append([row[name] for name in COMPARED if name != "audit"])
     last = np.array([values[-1] for values in by_deck.values()])
     rest = [values[-1][0] for values in by_deck.values() if values[-1][0] >= values[0][0]]
     return (
         f"Conclusion: on the finest meshes the displacements differ by {100 * min(last[:, 0]):.2g} to "
         f"{100 * max(last[:, 0]):.2g} % of the largest, and the total contact forces by {100 * min(last[:, 1]):.2g} to "
         f"{100 * max(last[:, 1]):.2g} %. The displacements come closer on {len(by_deck) - len(rest)} of {len(by_deck)} "
-        f"decks; on the others they differ by at most {100 * max(rest, default=0.0):.2g} %, which the penalty leaves."
+        f"decks; on the others they differ by at most {100 * max(rest, default=0.0):.2g} %, which the penalty leaves. "
+        f"With the same stiffness the forces differ by {100 * min(last[:, 3]):.2g} to {100 * max(last[:, 3]):.2g} %; "
+        f"those of plane stress by {100 * by_deck['block CPS4'][-1][3]:.2g} in place of "
+        f"{100 * by_deck['block CPS4'][-1][1]:.2g} %, and those of wedges by "
+        f"{100 * by_deck['block C3D6'][-1][3]:.2g} in place of {100 * by_deck['block C3D6'][-1][1]:.2g} %."
     )
 
 

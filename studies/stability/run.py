@@ -49,7 +49,7 @@ class Watched:
 
         def watched(search):
             proven = run(search)
-            self.ranges += len(proven.ranges)
+            self.ranges += len({(leaf.low, leaf.high) for leaf in proven.leaves})
             self.programs += search.programs
             self.kinds.append(_kind(proven))
             return proven
@@ -67,12 +67,11 @@ def _kind(proven):
         return "growing"
     if proven.gaps:
         return "undecided"
-    leaves = [leaf for _, _, own in proven.ranges for leaf in own]
-    if any(leaf.slides or leaf.stays for leaf in leaves):
+    if any(leaf.slides or leaf.stays for leaf in proven.leaves):
         return "decided"
-    if any(np.any(N) for leaf in leaves for N in leaf.products):
+    if any(np.any(N) for leaf in proven.leaves for N in leaf.products):
         return "products"
-    return "weights" if any(np.any(leaf.weights != np.eye(len(leaf.weights))) for leaf in leaves) else "plain"
+    return "weights" if any(np.any(leaf.weights != np.eye(len(leaf.weights))) for leaf in proven.leaves) else "plain"
 
 
 def bodies(run: Run) -> None:

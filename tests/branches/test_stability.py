@@ -49,6 +49,11 @@ def test_verdicts_of_arcs_are_those_of_their_roots(square):
     assert sorted(by_statuses.values()) == [QUIET] * 2 + [AWAY] * 3
 
 
+def test_short_parts_are_searched_as_a_whole_where_what_serves_in_the_middle_leaves_no_room():
+    graph = enumsol.branch_graph(enumsol.gallery.get("dovetail-14").build(), (0.6, 0.75))
+    assert [[span.verdict for span in spans] for spans in graph.stability()] == [[QUIET]]
+
+
 def test_a_mass_that_is_given_counts_and_stays(triangle):
     assert triangle.verdicts is None
     once = triangle.stability(mass=np.eye(2))

@@ -8,6 +8,8 @@ import numpy as np
 import pytest
 from complete import complete_report
 from effort import some
+from helpers.floating_bodies import pushed_block
+from helpers.floating_space import floating_in_space, over_alpha
 from problems3d import OneNode, in_space, random_over_alpha, random_plane_over_alpha
 from proof_tools import copied, proof_of, put, records_of
 from space_graph_proofs import Parts, closed_branch, mutant
@@ -32,6 +34,12 @@ CASES = {
     "fold": (lambda: random_over_alpha(2, 119), "0", "1/8"),
     "curves": (lambda: random_over_alpha(1, 513), "0", "1"),
     "closed": (closed_branch, "1.3", "1.6"),
+    "held by contact": (lambda: over_alpha(1), "0", "0.3"),
+    "block held by contact": (
+        lambda: floating_in_space(pushed_block(1, max_rigid_displacement=4.0)),
+        "0",
+        "0.5",
+    ),
 }
 
 

@@ -143,6 +143,13 @@ def test_honest_proofs_by_the_judge(name):
     assert verdicts == [found.verdict for found in known(name)[2].verdicts]
 
 
+def test_a_proof_takes_what_verdicts_found(monkeypatch):
+    roots = enumsol.enumerate_roots(gallery.get("taper-8").build(), 0.2)
+    found = roots.stability()
+    monkeypatch.setattr(search.StabilitySearch, "run", None)
+    assert verify(roots[0].problem, roots.stability_proof()).verdicts == tuple(own.verdict for own in found)
+
+
 def test_what_is_verified_is_not_little():
     """Of these problems some roots run away, some do not, and some need more than plain numbers."""
     verdicts = [verdict for name in PROBLEMS for verdict in checked(name, known(name)[3]).verdicts]

@@ -98,3 +98,19 @@ def test_a_bare_mesh_is_no_problem(here, capsys):
         "bare.inp has no *STEP; expected a deck with a step, or a bare mesh for enumsol solve"
         in capsys.readouterr().err
     )
+
+
+def test_elements_of_a_bare_mesh_are_ignored_and_results_are_read_in_one_way(here, capsys):
+    mesh = (
+        DECK[: DECK.index("*MATERIAL")]
+        + "*NODE\n900, 9., 9.\n901, 9., 10.\n902, 8., 9.\n*ELEMENT, TYPE=S3\n900, 900, 901, 902\n"
+    )
+    (here / "mesh.inp").write_text(mesh)
+    options = ["--young", "1", "--poisson", "0.3", "--pair", "UNDER:UPPER", "--clamp", "BOTTOM", "--clamp", "TOP"]
+    assert main(["solve", "mesh.inp", *options, "--friction", "0.3", "--dry-run"]) == 2
+    assert "mesh.inp line" in capsys.readouterr().err
+    assert main(["solve", "mesh.inp", *options, "--friction", "0.3", "--dry-run", "--ignore", "S3"]) == 0
+    assert "5 contact nodes of the pair UNDER:UPPER" in capsys.readouterr().out
+    (here / "mesh.msh").write_text("")
+    with pytest.raises(enumsol.InvalidArgumentError, match=r"ignore is \('S3',\) for a mesh that is no deck"):
+        enumsol.fem.read_mesh("mesh.msh", ignore=("S3",))

@@ -11,7 +11,7 @@ from command_line import on_terminal, run
 
 import enumsol
 from enumsol import gallery
-from enumsol.cli.streams import say
+from enumsol.cli.progress import say
 from enumsol.support.messages import visible
 
 RED, TITLE, MIRRORED = "\x1b[31mred\x1b[0m", "\x1b]0;mine\x07", "a\u202eb"

@@ -16,7 +16,7 @@ import enumsol
 from enumsol import gallery
 from enumsol.cli.app import app
 from enumsol.cli.output import deliver
-from enumsol.cli.streams import guarded_streams
+from enumsol.cli.progress import guarded_streams
 
 FULL = "/dev/full"
 GALLERY = "gallery:one-node-6.1"

@@ -10,9 +10,8 @@ import scipy.sparse as sp
 from refusals import bad_argument, bad_problem
 
 from enumsol import ContactProblem, enumerate_roots, gallery
-from enumsol.condensation.condensed import RHS_BLOCK
 from enumsol.condensation.exact import ExactSystem, UncondensedSystem
-from enumsol.condensation.factorization import Factorization
+from enumsol.condensation.factorization import RHS_BLOCK, Factorization
 from enumsol.selections.rational_selections import ExactSelections
 
 

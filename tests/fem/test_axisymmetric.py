@@ -138,3 +138,60 @@ def test_axisymmetric_elements_of_decks(tmp_path):
     scene = fem.mesh_scene(tmp_path / "ring.inp", young=1, poisson=0.3, contact="BELOW", clamp="LID", friction=0.1)
     assert scene.body.axisymmetric
     assert "plane axisymmetric" in str(scene)
+
+
+def cone_on_cone(height, taper, ny=6):
+    """A hollow cone in another one, whose radii grow by a factor along the axis."""
+    inner, outer = ring(3, ny, 9, 1.0, 1.5, height), ring(3, ny, 9, 1.5, 2.0, height)
+    count = len(inner.points)
+    facets = {f"inner.{name}": part for name, part in inner.facets.items()}
+    facets |= {f"outer.{name}": part + count for name, part in outer.facets.items()}
+    points = np.concatenate([inner.points, outer.points])
+    points[:, 0] *= 1 + taper * (points[:, 1] - height / 2)
+    return fem.PartedMesh(points, np.concatenate([inner.cells, outer.cells + count]), facets)
+
+
+@pytest.mark.parametrize(("friction", "accuracy"), [(0.0, 1e-4), (0.1, 1e-3)])
+def test_a_taper_has_the_pressure_of_lame_and_the_push_of_statics(friction, accuracy):
+    """A push by d makes an interference of d tan(angle), less what the rings give way in shear."""
+    height, taper, push = 4.0, 0.005, 0.05
+    problem = fem.mesh_problem(
+        cone_on_cone(height, taper), young=E, poisson=0.0, plane="axisymmetric", friction=friction,
+        displacement={"inner.left": ("free", 0.0), "outer.right": ("free", push)},
+        pairs=[("inner.right", "outer.left")],
+    )  # fmt: skip
+    roots = enumsol.enumerate_roots(problem, 0)
+    assert roots.complete
+    (root,) = roots
+    a, b, c = 1.0, 1.5, 2.0
+    slope = b * taper
+    soft = b / E * ((c**2 + b**2) / (c**2 - b**2) + (b**2 + a**2) / (b**2 - a**2))
+    sheared = b * np.log(c / a) / (E / 2) * (friction + slope)
+    pressure = push * slope / (soft + slope * sheared)
+    assert np.isclose(root.lambda_n.sum(), pressure * 2 * np.pi * b * height, rtol=accuracy)
+    np.testing.assert_allclose(np.abs(root.lambda_t), friction * root.lambda_n, atol=1e-12)
+    # what holds the inner cone at its bore is the push
+    u = problem.mesh.displacements(root.u)
+    angle = np.arctan(slope)
+    push_force = root.lambda_n.sum() * (np.sin(angle) + friction * np.cos(angle))
+    forces = (problem.contact_rows.T @ np.concatenate([root.lambda_n, root.lambda_t])) * (problem.mesh.dofs % 2 == 1)
+    inner = np.isin(problem.mesh.dofs // 2, np.arange(len(u) // 2))
+    assert np.isclose(abs(forces[inner].sum()), push_force, rtol=1e-12)
+
+
+@pytest.mark.parametrize("friction", [0.0, 0.3])
+def test_a_valve_on_its_seat_carries_its_load_as_statics_has_it(friction):
+    """A plug that is pressed into a rigid conical seat, and slides: N (sin + F cos) is the load."""
+    plug = moved(grid(4, 3, 9, 1.0, 0.5), lambda points: points * np.stack([1 + points[:, 1], np.ones(len(points))], 1))
+    problem = fem.mesh_problem(
+        plug, **AROUND, contact="right", pressure={"top": 0.01}, friction=friction, max_rigid_displacement="auto"
+    )
+    roots = enumsol.enumerate_roots(problem, 0)
+    assert roots.complete
+    (root,) = roots
+    normals = np.array([problem.Bn.toarray() @ (problem.mesh.dofs % 2 == k) for k in (0, 1)])
+    np.testing.assert_allclose(normals[:, 0], np.array([1.0, -1.0]) / np.sqrt(2), atol=1e-12)
+    pressed = root.lambda_n > 0
+    assert np.all(np.abs(root.lambda_t[pressed]) == pytest.approx(friction * root.lambda_n[pressed]))
+    load = 0.01 * np.pi * 1.5**2
+    assert root.lambda_n.sum() * (1 + friction) / np.sqrt(2) == pytest.approx(load, rel=1e-10)

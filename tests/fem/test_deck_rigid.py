@@ -225,7 +225,7 @@ WRONG = {
     "no reference": (SEGMENTS.replace("REF NODE=99, ", ""), r"line \d+: \*RIGID BODY has no REF NODE"),
     "another surface": (
         SEGMENTS.replace("SURFACE=FLOOR", "SURFACE=FLOR"),
-        r"line \d+: element 'FLOR' is not in the deck",
+        r"line \d+: \*SURFACE FLOOR is of no \*RIGID BODY; expected one with ANALYTICAL SURFACE=FLOOR",
     ),
 }
 

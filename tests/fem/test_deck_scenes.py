@@ -58,6 +58,7 @@ RIGHT = {
         {"pressure": None, "body_force": {"UPPER": (0, -2 * 9.81), "LOWER": (0, -3 * 9.81)}}),
     "gravity of all": (deck(mesh=MESH + "*ELSET, ELSET=EVERY\nUPPER, LOWER\n", steps=step(DOWN + "*DLOAD\nEVERY, GRAV, 9.81, 1., 0., 0.\n")),
         {"pressure": None, "body_force": {"UPPER": (2 * 9.81, 0), "LOWER": (3 * 9.81, 0)}}),
+    "gravity of all elements": (deck(steps=step(DOWN + "*DLOAD\n, GRAV, 9.81, 1., 0., 0.\n")), {"pressure": None, "body_force": {"UPPER": (2 * 9.81, 0), "LOWER": (3 * 9.81, 0)}}),
     "forces per volume": (deck(steps=step(DOWN + "*DLOAD\nUPPER, BX, 0.5\nUPPER, BY, -0.25\n12, P2, 2.\n")), {"body_force": {"UPPER": (0.5, -0.25)}}),
     "force per volume of an element": (deck(steps=step(DOWN + "*DLOAD\n12, BX, 0.5\n")), {"pressure": None, "body_force": {"LAST": (0.5, 0)}}),
     "an amplitude": (deck(materials="*AMPLITUDE, NAME=RISE\n0., 0., 0.5, 0.5,\n2., 2.\n" + MATERIALS,
@@ -79,6 +80,9 @@ RIGHT = {
     "contact of a surface of nodes": (deck(mesh=MESH + "*SURFACE, NAME=POINTS, TYPE=NODE\n11\n12\n13\n", contact=CONTACT.replace("UNDER", "POINTS")), {}),
     "gaps that are closed": (deck(mesh=LIFTED, contact=CONTACT.replace("DRY\nUNDER", "DRY, ADJUST=0.01\nUNDER")), {}),
     "a press fit that is taken away": (deck(mesh=LIFTED.replace("1.004", "0.996"), contact=CONTACT.replace("DRY\nUNDER", "DRY, ADJUST=0.\nUNDER")), {}),
+    "named surfaces of all contacts": (deck(contact="*SURFACE INTERACTION, NAME=DRY\n*FRICTION\n0.3\n*CONTACT\n*CONTACT INCLUSIONS\nUNDER, ON\n*CONTACT PROPERTY ASSIGNMENT\n , , DRY\n"), {}),
+    "properties of one of all contacts": (deck(mesh=LIFTED.replace("1.004", "0.996"), contact="*CONTACT\n*CONTACT INCLUSIONS\nUNDER, ON\n*CONTACT PROPERTY ASSIGNMENT\nON, UNDER, DRY\n*SURFACE INTERACTION, NAME=DRY\n*FRICTION\n0.3\n"), {}),
+    "all contacts without friction": (deck(contact="*CONTACT\n*CONTACT INCLUSIONS\nUNDER, ON\n"), {"friction": 0.0}),
     "gaps of a set that are closed": (deck(mesh=LIFTED + "*NSET, NSET=LOW\n11, 12, 13\n", contact=CONTACT.replace("DRY\nUNDER", "DRY, ADJUST=LOW\nUNDER")), {}),
     "a press fit that is taken up in the step": (deck(mesh=LIFTED.replace("1.004", "1."), contact=CONTACT + "*CLEARANCE, MASTER=ON, SLAVE=UNDER, VALUE=-0.004\n",
         steps=step(DOWN + PUSH + "*Contact Interference, shrink\nUNDER, ON\n")), {"pairs": [("UNDER", "ON", -0.004)]}),
@@ -129,6 +133,7 @@ WRONG = {
     "two pressures on one face": (deck(steps=step(PUSH + "*DLOAD\n12, P2, 1.\n")), r"line \d+: \*DLOAD gives P2 of element 12 the value 1, .* 2 in the same step"),
     "a load that is none": (deck(steps=step("*DLOAD\n12, HP, 1.\n")), r"line \d+: \*DLOAD has the load HP"),
     "a face that is none": (deck(steps=step("*DLOAD\n12, P5, 1.\n")), r"line \d+: \*DLOAD loads P5 of element 12 of type CPE4, which has 4 faces"),
+    "a pressure on nothing": (deck(steps=step("*DLOAD\n, P2, 1.\n")), r"line \d+: \*DLOAD has a line without a node, an element or a set"),
     "gravity without a direction": (deck(steps=step("*DLOAD\nUPPER, GRAV, 9.81\n")), r"line \d+: \*DLOAD has GRAV without a direction"),
     "gravity in a long direction": (deck(steps=step("*DLOAD\nUPPER, GRAV, 9.81, 0., -2., 0.\n")), r"line \d+: \*DLOAD has GRAV with a direction of length 2"),
     "gravity without density": (deck(materials=MATERIALS.replace("*DENSITY\n2.\n", ""), steps=step("*DLOAD\nUPPER, GRAV, 9.81, 0., -1., 0.\n")), r"line \d+: \*DLOAD has GRAV on elements of SOFT, which has no \*DENSITY"),
@@ -157,6 +162,11 @@ WRONG = {
     "an interference by an amplitude": (deck(steps=step("*CONTACT INTERFERENCE, AMPLITUDE=A\nUNDER, ON\n")), r"line \d+: \*CONTACT INTERFERENCE has the option AMPLITUDE"),
     "a behavior of nothing changes": (deck(steps=step("*CHANGE SURFACE BEHAVIOR, INTERACTION=WET\n")), r"line \d+: \*CHANGE SURFACE BEHAVIOR names the interaction WET"),
     "a behavior in a step": (deck(steps=step("*SURFACE BEHAVIOR, PRESSURE-OVERCLOSURE=HARD\n")), r"line \d+: \*SURFACE BEHAVIOR stands in a step without \*CHANGE SURFACE BEHAVIOR"),
+    "all that is outside": (deck(contact="*CONTACT\n*CONTACT INCLUSIONS, ALL EXTERIOR\n"), r"line \d+: \*CONTACT INCLUSIONS has ALL EXTERIOR; expected the surfaces"),
+    "a surface with nothing": (deck(contact="*CONTACT\n*CONTACT INCLUSIONS\nUNDER,\n"), r"line \d+: \*CONTACT INCLUSIONS has UNDER:; expected two named surfaces"),
+    "inclusions in nothing": (deck(contact="*CONTACT INCLUSIONS\nUNDER, ON\n"), r"line \d+: \*CONTACT INCLUSIONS has UNDER:ON; expected two named surfaces behind \*CONTACT"),
+    "properties of no pair": (deck(contact="*CONTACT\n*CONTACT INCLUSIONS\nUNDER, ON\n*CONTACT PROPERTY ASSIGNMENT\nUNDER, ABOVE, DRY\n"), r"line \d+: \*CONTACT PROPERTY ASSIGNMENT gives DRY to UNDER:ABOVE"),
+    "all contacts of a step": (deck(steps=step("*CONTACT\n")), r"line \d+: \*CONTACT stands in a step"),
     "an adjustment of no set": (deck(contact=CONTACT.replace("DRY\nUNDER", "DRY, ADJUST=BOTTUM\nUNDER")), r"line \d+: node 'BOTTUM' is not in the deck"),
     "a clearance of no pair": (deck(contact=CONTACT + "*CLEARANCE, SLAVE=ON, MASTER=UNDER, VALUE=0.1\n"), r"line \d+: \*CLEARANCE names the pair ON:UNDER; .* UNDER:ON"),
     "a clearance of no size": (deck(contact=CONTACT + "*CLEARANCE, SLAVE=UNDER, MASTER=ON\n"), r"line \d+: \*CLEARANCE has no VALUE"),
@@ -286,10 +296,6 @@ def test_a_motion_of_nodes_without_contact_and_friction_are_steps_of_a_history(r
     ("cards", "what"),
     [
         ("*BOUNDARY, OP=NEW\nBOTTOM, 1, 2\nSIDE, 1\n", "what is held"),
-        (
-            "*MODEL CHANGE, TYPE=CONTACT PAIR, REMOVE\nABOVE, ON\n*MODEL CHANGE, TYPE=CONTACT PAIR, ADD\nUNDER, ON\n",
-            "which pairs are in contact",
-        ),
         ("*BOUNDARY\nBOTTOM, 2, 2, 0.01\n", "the displacement of nodes that are in contact or faced by such"),
     ],
 )
@@ -300,6 +306,23 @@ def test_steps_that_change_more_than_loads_are_refused(read, cards, what):
     cards = cards if "NEW" in cards else cards.replace("BOTTOM", "LOWEST")
     with pytest.raises(enumsol.InvalidProblemError, match=rf"line \d+: step 2 changes {what}"):
         read(deck(mesh=mesh, held=held, steps=PRESSED + step(cards))).steps()
+
+
+def test_steps_with_other_pairs_in_contact_are_no_history(read):
+    """As many rows in both, of the nodes of the other body in the second."""
+    out, back = (f"*MODEL CHANGE, TYPE=CONTACT PAIR, {word}\n" for word in ("REMOVE", "ADD"))
+    first = step(out + "ON, UNDER\n" + DOWN + PUSH)
+    second = step(out + "UNDER, ON\n" + back + "ON, UNDER\n")
+    contact = CONTACT + "*CONTACT PAIR, INTERACTION=DRY\nON, UNDER\n"
+    plain = read(deck(contact=contact, steps=first + second))  # nodes that face each other: the same laws
+    assert_same(plain.problem(1), by_hand())
+    assert_same(plain.problem(2), by_hand(pairs=[("ON", "UNDER")]))
+    assert len(plain.steps()) == 2
+    mesh = MESH.replace("2, 1., 0.\n", "2, 1.2, 0.\n", 1).replace("5, 1., 1.\n", "5, 1.2, 1.\n", 1)
+    model = read(deck(mesh=mesh, contact=contact, steps=first + second))
+    assert model.problem(1).p == model.problem(2).p
+    with pytest.raises(enumsol.InvalidProblemError, match=r"line \d+: step 2 changes which pairs are in contact"):
+        model.steps()
 
 
 def test_of_several_steps_one_is_named(read):
@@ -417,6 +440,12 @@ def test_temperatures_without_initial_ones_count_from_0_and_amplitudes_count(rea
 
 def test_temperatures_where_nothing_expands_are_said_not_to_be_used(read):
     model = read(deck(steps=step(DOWN + PUSH + "*TEMPERATURE\nALL, 10.\n")))
+    assert_same(model.problem(), by_hand())
+    assert "*TEMPERATURE          not used: no material has *EXPANSION" in str(model)
+    text = deck(
+        steps=step(DOWN + PUSH + "*TEMPERATURE\nALL, 10.\n"), materials=MATERIALS.replace("2.", "2.\n*EXPANSION\n0.")
+    )
+    model = read(text + "\n")
     assert_same(model.problem(), by_hand())
     assert "*TEMPERATURE          not used: no material has *EXPANSION" in str(model)
 

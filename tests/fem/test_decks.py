@@ -83,7 +83,7 @@ def test_surfaces_are_facets(deck):
 @pytest.mark.parametrize(
     ("new", "message"),
     [
-        ("*NGEN\n1, 3, 1\n*STEP\n", r"deck.inp line 27: \*NGEN makes or moves nodes or elements"),
+        ("*NMAP, NSET=A\n1, 3, 1\n*STEP\n", r"deck.inp line 27: \*NMAP makes or moves nodes"),
         ("*INSTANCE, NAME=A, PART=P\n0., 1., 0.\n*STEP\n", r"line 27: \*INSTANCE is of the part P, which is not"),
         ("*NSET, NSET=ALL\nNONE\n", "line 28: there is no set of nodes named 'NONE'; expected"),
     ],

@@ -31,7 +31,7 @@ from rational_forms import (
     multipliers,
     need,
 )
-from rational_pieces import ClosedPiece
+from rational_pieces import ClosedPiece, FloatingPiece
 from rational_references import References
 
 MAGIC = b"enumsol-proof 2\n"
@@ -156,6 +156,8 @@ class Proof:
                 key = "undecided, F = 0"
             elif i in varying and key in (2, 3):
                 key = "slip+" if key == 2 else "slip-"
+            elif i in varying and key in (7, 8):
+                key = 6
             need(kind < len(ALLOWED[key]), "a row does not exist")
             allowed = ALLOWED[key][kind]
             need(allowed == "E" or (allowed == "+" and value >= 0), "a multiplier is not allowed")
@@ -169,6 +171,8 @@ def refinements(code, friction):
         return (0, 1, 2, 3) if friction else (0, 4)
     if code == 5:
         return (1, 2, 3) if friction else ()
+    if code in (7, 8):
+        return (0, code - 5) if friction else ()
     return (code,) if code in ((0, 1, 2, 3) if friction else (0, 4)) else ()
 
 
@@ -401,7 +405,9 @@ class Graph(Proof):
         counts = {"pieces": self.pieces, "leaves": self.leaves, "selections": len(self.handed_on)}
         if "pieces" not in records[position]:
             need(set(records[position]) == {"traces", "force", "length"}, "arcs begin with other names")
-            self.units(records[position])
+            scale = self.units(records[position])
+            for piece in self.closed:
+                piece.scale = scale
             arcs = Arcs(self.data, (self.a, self.b), self.origin, self.handed_on, self.closed)
             counts |= arcs.run(records[position], records[position + 1 : -1])
             position = len(records) - 1
@@ -425,17 +431,22 @@ class Graph(Proof):
         closed = "m" in kinds
         if closed:
             need(roots == ["6" * self.p], "a piece closed by its arcs is not whole")
-            need(kinds.count("m") == 1 and set(kinds) <= {"m", "s"}, "a piece closed by its arcs holds more than that")
+            allowed = {"m", "s", *self.beside_arcs}
+            need(kinds.count("m") == 1 and set(kinds) <= allowed, "a piece closed by its arcs holds more than that")
+            beside = [(kind, self.codes(text, 8), *rest) for kind, text, *rest in leaves if kind in self.beside_arcs]
+            self.leaves += sum(kind != "x" for kind, *_ in beside)
         for kind, text, *rest in leaves:
             if kind == "m":
-                self.closed.append(ClosedPiece(self.data, x, y, text, *rest))
+                self.closed.append(self.closed_piece(x, y, [text, *rest], beside))
+                continue
+            if closed and kind in self.beside_arcs and kind != "x":
                 continue
             if kind == "q":
                 declared = [list(map(exact, values)) for values in (text, *rest)]
                 need([len(values) for values in declared] == [self.p] * 4, "a form has another size")
                 need(min(declared[2] + declared[3]) >= 0, "a multiplier of a form is negative")
                 continue
-            codes = self.codes(text)
+            codes = self.codes(text, 8 if closed else 6)
             covered.update(self.selections_below(codes, friction))
             if kind == "x":
                 self.leaves += 1
@@ -461,6 +472,12 @@ class Graph(Proof):
         self.pieces += 1
         return cut
 
+    #: Leaves of pieces that are closed by their arcs.
+    beside_arcs = ()
+
+    def closed_piece(self, x, y, lists, beside):
+        return ClosedPiece(self.data, x, y, *lists)
+
     def starts(self):
         """[7.1] alpha_0."""
         return self.data.origin()
@@ -476,8 +493,8 @@ class Graph(Proof):
     def selections_below(codes, friction):
         return list(product(*(refinements(code, positive) for code, positive in zip(codes, friction, strict=True))))
 
-    def codes(self, text):
-        need(re.fullmatch(f"[0-6]{{{self.p}}}", text, re.ASCII), "no codes")
+    def codes(self, text, most=6):
+        need(re.fullmatch(f"[0-{most}]{{{self.p}}}", text, re.ASCII), "no codes")
         return tuple(map(int, text))
 
 
@@ -488,12 +505,17 @@ class FloatingGraph(Graph):
         super().__init__(problem, header)
         self.same_bound(header)
 
+    beside_arcs = ("o", "i", "x")
+
+    def closed_piece(self, x, y, lists, beside):
+        return FloatingPiece(self.data, x, y, *lists, beside)
+
     def starts(self):
         return None
 
     def run(self, records):
         lists = [record[0] for record in records if isinstance(record, list)]
-        need(set(lists) <= {"x", "s", "c", "t", "b"}, "a record that such a graph cannot have")
+        need(set(lists) <= {"x", "s", "c", "t", "b", "m", "o", "i"}, "a record that such a graph cannot have")
         return super().run(records)
 
     def forms_of(self, ends, loads, F_hi, F_lo):

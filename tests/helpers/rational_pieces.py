@@ -8,7 +8,8 @@ from functools import cached_property
 from itertools import islice, product
 
 from flint import fmpq, fmpq_mat, fmpq_poly
-from rational_forms import Forms, _value, exact, need
+from rational_forms import Forms, Refused, _value, exact, need
+from rational_references import FINAL, SPLITS, Reference
 from rational_zeros import cells, interpolated, one_sign
 
 #: Alphas of a piece at which all selections are tried, as shares of its length.
@@ -101,6 +102,62 @@ class ClosedPiece:
     def _solves(forms, codes, point):
         equations = all(_value(form, point) == 0 for form in forms.equations(codes))
         return equations and all(_value(form, point) >= 0 for form in forms.conditions(codes))
+
+
+class FloatingPiece(ClosedPiece):
+    """A record "m" of a body that nothing holds, with its leaves o and i.
+
+    The forms of its leaves are tested at some alphas, with the root that the arcs have there.
+    """
+
+    def __init__(self, data, x, y, mu, kappa, nu, more, leaves):
+        super().__init__(data, x, y, mu, kappa, nu)
+        need(len(more) == 3 and exact(more[2]) in range(1, 33), "a form has another size, or no degree")
+        self.balance, self.share, self.leaves = more[0], more[1], leaves
+        for kind, _, first, *_ in leaves:
+            need(kind != "o" or first == 1, "a form was not declared")
+
+    def check(self, traces, pairs, origin):
+        led = [selection.codes for selection, *_ in self._led(traces, pairs)]
+        final = [FINAL[i in self.rubbing] for i in range(self.p)]
+        for selection in product(*final):
+            need(any(self._below(selection, codes) for _, codes, *_ in self.leaves), "a selection is in no leaf")
+        for kind, codes, *rest in self.leaves:
+            if kind == "i":
+                forms = (self.data.forms(alpha) for alpha in (self.x, self.y))
+                balanced = [not form.unbalanced(codes, rest[0], self.scale[0]) for form in forms]
+                need(not any(balanced), "forces of a leaf may be in balance with the load")
+        for share in TRIED:
+            self._roots_at(self.x + share * (self.y - self.x), led, list(product(*final)))
+
+    def _roots_at(self, alpha, led, selections):
+        forms = self.data.forms(alpha)
+        found = {codes: points for codes in selections if (points := forms.hull(codes))}
+        need(len({point for points in found.values() for point in points}) == 1, "a piece has several solutions")
+        need(set(led) & set(found), "the solution lies on no arc")
+        # where several selections hold, it is at an event
+        for codes in found if len(found) == 1 else ():
+            self._leaves_at(forms, codes)
+
+    def _leaves_at(self, forms, selection):
+        rubbing, sides = self.rubbing, {2: (1,), 3: (-1,), 1: (0,), 0: (0, 1, -1)}
+        rubs = [i in rubbing for i in range(self.p)]
+        for chosen in product(*(sides[selection[i]] for i in rubbing)):
+            weights = [*self.mu, *(values[i] for values in (self.kappa, self.nu) for i in rubbing), *map(fmpq, chosen)]
+            reference = Reference(forms, rubs, self.scale, selection, weights, exact(self.balance), exact(self.share))
+            try:
+                _ = reference.numbers
+            except Refused:
+                continue
+            for kind, codes, *rest in self.leaves:
+                if kind == "o":
+                    reference.check(codes, *rest[1:])
+            return
+        need(False, "no theta serves a solution")
+
+    @staticmethod
+    def _below(selection, codes):
+        return all(own == code or own in SPLITS.get(code, ()) for own, code in zip(selection, codes, strict=True))
 
 
 class _Along:

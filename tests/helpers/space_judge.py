@@ -5,8 +5,6 @@ document. What a leaf claims is decided in its own way: exclusions as they stand
 into boxes, so that no claim is refused because the checker's way does not lead to it.
 """
 
-from math import log2
-
 from flint import arb, arb_mat, ctx, fmpq
 from rational_checker import are, record_of, records_of  # noqa: F401
 from rational_forms import Refused, decimal_fraction, exact, integer, need
@@ -16,16 +14,15 @@ from space_judge_data import (
     Terms,
     Undecided,
     column,
-    corner,
     fingerprint,
     floating_margin,
-    following,
     is_code,
     is_complete,
     is_definite,
     is_split,
     length_of,
     margin,
+    most,
     positive,
     sector_of,
 )
@@ -50,7 +47,6 @@ def judge_records(problem, records):
         need(kind in ("space", "graph"), "an unknown kind of proof")
         data = data_of(problem, header)
         if kind == "graph":
-            need(data.modes is None, "no graphs of bodies that nothing holds")
             return Graph(problem, header, data, units(header, problem.p)[0]).run(records[1:])
         return Point(problem, header, data).run(records[1:])
     except (KeyError, TypeError, ValueError, IndexError, AttributeError, OverflowError, ZeroDivisionError) as error:
@@ -140,12 +136,8 @@ class Point:
     def leaf_i(self, codes, z):
         """[6.3] No forces that the assignment allows are in balance with the load."""
         need(self.system.rigid, "a body that is held")
-        G, h, _ = self.system.rigid
-        z = floats(z, len(h))
-        for j, row in enumerate(self.data.G.tolist()):
-            largest = max(abs(float(x)) / 2.0 ** self.scale[0][k % self.p] for k, x in enumerate(row))
-            z[j] *= arb(2) ** (-round(log2(largest)) if largest else 0)
-        pull = (arb_mat([z]) * G).entries()
+        _, h, _ = self.system.rigid
+        z, pull = self.data.pulls(self.system, floats(z, len(h)), self.scale[0])
         need(sum((a * b for a, b in zip(z, h, strict=True)), arb(0)) > 0, "z does not push against the load")
         for i, (code, places) in enumerate(zip(codes, self.system.tau, strict=True)):
             if code != 0:
@@ -343,24 +335,6 @@ class Boxed:
 
     def holds(self, zeta):
         return all(abs(a - b) <= c for a, b, c in zip(zeta, self.middle, self.radius, strict=True))
-
-
-def most(code, pull):
-    """The largest value of pull . tau for the tau of a node with lambda_n = 1."""
-    if not pull or code == 4:
-        return arb(0)
-    if code in (2, 3):
-        return pull[0] if code == 2 else -pull[0]
-    number = sector_of(code)
-    if number:
-        ends = [[arb(x) for x in d] for d in (corner(number), corner(following(number)))]
-        (a, b), (c, d) = ends
-        x, y = pull
-        if not (a * y - b * x > 0 and x * d - y * c > 0):
-            found = [x * u + y * v for u, v in ends]
-            beside = a * y - b * x < 0 or x * d - y * c < 0
-            return found[0].max(found[1]) if beside else found[0].max(found[1]).max(length_of(pull))
-    return length_of(pull)
 
 
 def same(root, other):

@@ -86,8 +86,10 @@ class Walk:
         #: ("way", alpha, alpha, sign), ("vertex", alphas) or ("gap", alphas)
         self.found = []
         for k, box in enumerate(curve.boxes):
-            self.box = box
+            self.box, before, first = box, len(self.found), self.position
             self.part(curve.points[k], curve.points[k + 1])
+            if k in curve.crossing and {part[0] for part in records[first : self.position]} - {"s", "h"}:
+                self.found[before:] = [("gap", self.alphas(None))]
         self.closed = curve.closed
 
     def place(self, record, between):
@@ -158,11 +160,14 @@ class Walk:
             found = alpha if found is None else found.union(alpha)
         return found
 
+    def going(self, place):
+        """The sign of alpha's derivative by t of the box at a place, or None."""
+        return sign(place.direction[-1] / dot(place.direction, self.box.e))
+
     def rate(self, place):
-        """alpha's derivative by t of the box at a place."""
-        rate = place.direction[-1] / dot(place.direction, self.box.e)
-        need(sign(rate) is not None, "alpha rests at a place")
-        return sign(rate)
+        """The same where alpha does not rest."""
+        need(self.going(place) is not None, "alpha rests at a place")
+        return self.going(place)
 
     def way(self, start, end):
         """Statuses stay, and alpha goes one way."""
@@ -210,6 +215,9 @@ class Walk:
         natural, e = self.box.natural, self.box.e
         changing = [i for i, (a, b) in enumerate(zip(before.statuses, after.statuses, strict=True)) if a != b]
         need(changing, "no status changes at a corner")
+        if self.problem.rho and None in [self.going(place) for place in (before, after)]:
+            self.found.append(("gap", self.piece(before, after)[-1][-1]))
+            return
         if len(changing) > _TOGETHER:
             raise Undecided("many nodes change at once")
         x, d, half, around, z = self.piece(before, after)

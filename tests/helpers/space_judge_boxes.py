@@ -60,8 +60,10 @@ class NaturalMap:
     nodes are (place of lambda_n, places of tau) and discs the two numbers of their radii, which are affine in alpha.
     """
 
-    def __init__(self, S, g0, g1, nodes, discs, steps, alpha=None):
+    def __init__(self, S, g0, g1, nodes, discs, steps, alpha=None, free=()):
         self.S, self.g0, self.g1, self.nodes, self.discs, self.steps = S, g0, g1, nodes, discs, steps
+        #: [8] places of q, which P leaves as they are
+        self.free = free
         self.m, self.alpha, self.size = len(g0), alpha, len(g0) + (alpha is None)
         self.check_steps(steps)
         m, table = self.m, S.tolist()
@@ -120,6 +122,8 @@ class NaturalMap:
 
     def projected(self, z, alpha):
         found = [arb(0)] * self.m
+        for k in self.free:
+            found[k] = z[k]
         for (n, places), (F0, F1) in zip(self.nodes, self.discs, strict=True):
             normal, F, length = z[n].max(arb(0)), F0 + alpha * F1, length_of([z[t] for t in places])
             found[n] = normal
@@ -150,6 +154,8 @@ class NaturalMap:
         """
         P, U, V, terms = [[arb(0)] * (self.m + 1) for _ in range(self.m)], [], [], []
         z, alpha = around.z[:-1], around.z[-1]
+        for k in self.free:
+            P[k][k] = arb(1)
         for (n, t), (F0, F1), status in zip(self.nodes, self.discs, statuses or [None] * len(self.nodes), strict=True):
             F, zn, zt = F0 + alpha * F1, z[n], [z[k] for k in t]
             if zn < 0 or status == "open":

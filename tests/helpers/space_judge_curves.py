@@ -61,7 +61,14 @@ class GraphProblem:
         S = arb_mat([[a * q[i] * q[j] for j, a in enumerate(row)] for i, row in enumerate(table)])
         g0, g1 = ([a * b for a, b in zip(q, part, strict=True)] for part in (data.g0, data.g1))
         nodes = [(i, [(1 + k) * self.p + i for k in axes]) for i, axes in enumerate(self.axes)]
-        self.natural = NaturalMap(S, g0, g1, nodes, self.F, steps)
+        self.rho, size = (), 3 * self.p
+        if data.modes is not None:
+            self.rho, self.system.rigid, self.system.h1 = data.rho, data.rigid(self.system, base, data.h0), data.h1
+            G, more = [[a * b for a, b in zip(row, q, strict=True)] for row in data.G.tolist()], len(data.h0)
+            table = [[*row, *(-G[j][i] for j in range(more))] for i, row in enumerate(S.tolist())]
+            S, g0, g1 = arb_mat([*table, *([*row, *[arb(0)] * more] for row in G)]), [*g0, *data.h0], [*g1, *data.h1]
+        self.free = range(size, size + len(self.rho))
+        self.natural = NaturalMap(S, g0, g1, nodes, self.F, steps, free=self.free)
 
     def tau_rows(self):
         """Of every component of zeta: its place in y, or None, and the factor of lambda / q over y there."""
@@ -74,7 +81,8 @@ class GraphProblem:
                 place = self.system.tau[i][axes.index(k)]
                 q = self.ratio[i] if k else fmpq(1)
                 found.append((place, arb(self.base[k][i] / q)))
-        return found
+        # the bordered system has minus the rigid displacement
+        return found + [(self.system.m + j, arb(-1)) for j in range(len(self.free))]
 
 
 @dataclass
@@ -299,7 +307,7 @@ class Place:
 def place_of(problem, record):
     """[8.1] A record "w"."""
     need(isinstance(record, list) and record[0] == "w" and len(record) == 7, "no box")
-    size = 3 * problem.p + 1
+    size = 3 * problem.p + len(problem.free) + 1
 
     def numbers(values, count):
         need(isinstance(values, list) and len(values) == count, f"expected {count} numbers")

@@ -9,6 +9,7 @@ import struct
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import pairwise
+from math import log2
 
 import numpy as np
 from flint import arb, arb_mat, fmpq
@@ -138,14 +139,26 @@ class SpaceData:
         need(min(map(min, F)) >= 0, "friction is negative")
         system = System.scaled(self, F, [(arb(1), arb(0))] * self.p)
         fixed = [a + arb(alpha) * b for a, b in zip(system.g0, system.g1, strict=True)]
-        rigid = ()
-        if self.modes is not None:
-            F = [fmpq(1)] * self.p, *F
-            G = [[value * arb(F[k // self.p][k % self.p]) for k, value in enumerate(row)] for row in self.G.tolist()]
-            places = [*range(self.p), *((1 + k) * self.p + i for i in range(self.p) for k in system.axes[i])]
-            h = [a + arb(alpha) * b for a, b in zip(self.h0, self.h1, strict=True)]
-            rigid = arb_mat([[row[k] for k in places] for row in G]), h, self.rho
+        rigid = self.rigid(system, F, self.pushed(arb(alpha))) if self.modes is not None else ()
         return System(system.S, fixed, [arb(0)] * system.m, system.discs, system.tau, system.axes, rigid)
+
+    def pushed(self, alpha):
+        """[3.2] h."""
+        return [a + alpha * b for a, b in zip(self.h0, self.h1, strict=True)]
+
+    def rigid(self, system, F, h):
+        """[3.2] G~, h and rho."""
+        F = [fmpq(1)] * self.p, *F
+        G = [[value * arb(F[k // self.p][k % self.p]) for k, value in enumerate(row)] for row in self.G.tolist()]
+        places = [*range(self.p), *((1 + k) * self.p + i for i in range(self.p) for k in system.axes[i])]
+        return arb_mat([[row[k] for k in places] for row in G]), h, self.rho
+
+    def pulls(self, system, z, scale):
+        """[3.2] z of a record in the problem's units, and z'G~."""
+        for j, row in enumerate(self.G.tolist()):
+            largest = max(abs(float(x)) / 2.0 ** scale[k % self.p] for k, x in enumerate(row))
+            z[j] *= arb(2) ** (-round(log2(largest)) if largest else 0)
+        return z, (arb_mat([z]) * system.rigid[0]).entries()
 
 
 def _independent(N):
@@ -168,8 +181,9 @@ class System:
     discs: list
     tau: list
     axes: list
-    #: [3.2] G~, h and rho of a body that nothing holds
+    #: [3.2] G~, h and rho of a body that nothing holds, and how h changes with alpha
     rigid: tuple = ()
+    h1: tuple = ()
 
     @classmethod
     def scaled(cls, data, F, discs):
@@ -199,8 +213,8 @@ class System:
                 S[i, j] = self.S[i, j]
             for j in range(r):
                 S[i, m + j] = S[m + j, i] = G[j, i]
-        zeros = [arb(0)] * r
-        return System(S, [*self.g0, *h], [*self.g1, *zeros], self.discs, self.tau, self.axes, self.rigid)
+        more = self.h1 or [arb(0)] * r
+        return System(S, [*self.g0, *h], [*self.g1, *more], self.discs, self.tau, self.axes, self.rigid, self.h1)
 
     @property
     def m(self):
@@ -320,6 +334,24 @@ ALLOWED = {0: "+EE.", 1: "E+.E", 2: "E+..", 3: "E+..", 4: "E+..", 5: "E+..", 6: 
 FORCES = (1, 2, 4, 6, 7)
 
 
+def most(code, pull):
+    """[6.3] The largest value of pull . tau for the tau of a node with lambda_n = 1."""
+    if not pull or code == 4:
+        return arb(0)
+    if code in (2, 3):
+        return pull[0] if code == 2 else -pull[0]
+    number = sector_of(code)
+    if number:
+        ends = [[arb(x) for x in d] for d in (corner(number), corner(following(number)))]
+        (a, b), (c, d) = ends
+        x, y = pull
+        if not (a * y - b * x > 0 and x * d - y * c > 0):
+            found = [x * u + y * v for u, v in ends]
+            beside = a * y - b * x < 0 or x * d - y * c < 0
+            return found[0].max(found[1]) if beside else found[0].max(found[1]).max(length_of(pull))
+    return length_of(pull)
+
+
 def sign_of(code, kind, number):
     """What multiplier a row may have where a node has a code."""
     slip = sector_of(code)
@@ -420,7 +452,7 @@ def floating_margin(terms):
     system = terms.system
     G, h, rho = system.rigid
     best = None
-    for values in (terms.values[0], _in_balance(terms)):
+    for values in (terms.values[0], in_balance(terms, 0, h)):
         if values is None:
             continue
         plain, radial, moves = terms.sums(values=values)
@@ -444,11 +476,11 @@ def floating_margin(terms):
     return best
 
 
-def _in_balance(terms):
+def in_balance(terms, end, h):
     """Multipliers of the same signs near those of an exclusion, for which G y = h, or None."""
     system = terms.system
-    G, h, _ = system.rigid
-    values = [arb(value) for value in terms.values[0]]
+    G = system.rigid[0]
+    values = [arb(value) for value in terms.values[end]]
     columns = []
     for node, *_, moves in terms.rows:
         y = [arb(0)] * system.m

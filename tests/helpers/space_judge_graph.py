@@ -8,11 +8,22 @@ from itertools import combinations
 
 from flint import arb, arb_mat
 from rational_checker import are
-from rational_forms import decimal_fraction, exact, integer, need
-from space_judge_arcs import Walk
+from rational_forms import Refused, decimal_fraction, exact, integer, need
+from space_judge_arcs import Walk, sign, slope
 from space_judge_certificates import equations, square
 from space_judge_curves import GraphProblem, dot, place_of
-from space_judge_data import Terms, Undecided, column, is_code, is_complete, is_definite, is_split, length_of
+from space_judge_data import (
+    Terms,
+    Undecided,
+    column,
+    in_balance,
+    is_code,
+    is_complete,
+    is_definite,
+    is_split,
+    length_of,
+    most,
+)
 from space_judge_zeros import explore, roots_of
 
 #: As many times a piece is halved where an exclusion is shown to hold over it.
@@ -49,6 +60,39 @@ class Curve:
         need(self.closed or len(self.boxes) > 0, "no boxes")
         self.open = [] if self.closed else [k for k in (0, 1) if not self._leaves(k)]
         self._comes_back()
+        #: boxes beside which q comes to its bound
+        self.crossing = [k for k in range(len(self.boxes)) if self._crosses(k)]
+
+    def _crosses(self, k):
+        """Whether q comes to a bound in a box: there it goes outwards all along (theory, section 14.14)."""
+        box, last = self.boxes[k], len(self.boxes) - 1
+        t, wide = [x.mid() for x in self.t(k)], []
+        for j, rho in zip(self.problem.free, self.problem.rho, strict=True):
+            if not box.along(*t, lambda x, d, half, around, z, j=j, rho=rho: abs(z[j]) < rho or None):
+                wide.append((j, rho))
+        if not wide:
+            return False
+        inner = [(k, self.points[k])] if k == last else []
+        inner += [(k + 1, self.points[k + 1])] if k == 0 else []
+        need(not self.closed and inner, "q comes to a bound inside of a curve")
+        for place, point in inner:
+            within = all(abs(point.point[j]) < rho for j, rho in wide)
+            # the end is at the first point if the inner one is the last
+            if within and all(self._grows(box, t, j, place > k) for j, _ in wide):
+                return True
+        raise Undecided("q is not shown to go outwards")
+
+    @staticmethod
+    def _grows(box, t, j, first):
+        """Whether a coordinate moves one way along a box, away from zero at its first or at its last end."""
+        end = box.near(t[0] if first else t[1])[j]
+        way = sign(end) * (-1 if first else 1)
+
+        def holds(x, d, half, around, z):
+            natural = box.natural
+            return sign(slope(natural, natural.argument_at(x, d, half, around), d, box.e)[0][j]) == way or None
+
+        return box.along(*t, holds)
 
     def t(self, k):
         """From where to where the curve goes in a box."""
@@ -58,15 +102,18 @@ class Curve:
         """Whether all that boxes have beyond an end is beyond the interval."""
         x = self.ends[end]
         low, high = arb(self.problem.low), arb(self.problem.high)
-        if not (x[-1] < low or x[-1] > high):
-            return False
+        beyond = [lambda z: z[-1] < low or z[-1] > high]
+        beyond += [
+            lambda z, j=j, rho=rho: abs(z[j]) > rho for j, rho in zip(self.problem.free, self.problem.rho, strict=True)
+        ]
+        return any(test(x) and self._is_beyond(x, end, test) for test in beyond)
+
+    def _is_beyond(self, x, end, test):
         for box in self.boxes:
             if box.may_pass(x):
                 t = box.t(x)
                 part = (t.mid(), box.half) if end else (-box.half, t.mid())
-                if part[0] < part[1] and not box.along(
-                    *part, lambda x, d, half, around, z: True if z[-1] < low or z[-1] > high else None
-                ):
+                if part[0] < part[1] and not box.along(*part, lambda x, d, half, around, z: True if test(z) else None):
                     return False
         return True
 
@@ -98,11 +145,13 @@ class Graph:
         low, high = (decimal_fraction(text) for text in header["interval"])
         need(low < high, "an empty interval")
         steps = header["steps"]
-        need(isinstance(steps, list) and len(steps) == 3 * self.p, "steps are no list of 3p floats")
+        size = 3 * self.p + (0 if data.modes is None else len(data.h0))
+        need(isinstance(steps, list) and len(steps) == size, f"steps are no list of {size} floats")
         steps = [arb(exact(value)) for value in steps]
         need(min(steps) > 0, "a step is not positive")
         self.problem = GraphProblem(data, low, high, steps)
-        self.system = self.problem.system
+        self.system, self.data = self.problem.system, data
+        self.full = self.system.bordered
         self.tangents = [len(places) for places in self.system.tau]
         self.curves, self.walks, self.leaves, self.gaps = [], [], 0, 0
 
@@ -164,6 +213,7 @@ class Graph:
                     "t": self.leaf_t,
                     "k": self.leaf_k,
                     "u": self.leaf_u,
+                    **({"i": self.leaf_i} if self.system.rigid else {}),
                 }[record[0]]
                 test(low, high, codes, *record[1:])
         return position
@@ -174,11 +224,39 @@ class Graph:
 
     # -- exclusions ----------------------------------------------------------------------------------------------------
 
+    def leaf_i(self, low, high, codes, z):
+        """[6.3], [8.3] No forces are in balance with the load at either end, and so in between."""
+        need(isinstance(z, list) and len(z) == len(self.problem.rho), "a direction has another size")
+        z, pull = self.data.pulls(self.system, [arb(exact(value)) for value in z], self.scale[0])
+        for alpha in (arb(low), arb(high)):
+            need(dot(z, self.data.pushed(alpha)) > 0, "z does not push against the load")
+            for i, (code, places) in enumerate(zip(codes, self.system.tau, strict=True)):
+                largest = self.system.radius(i, alpha) * most(code, [pull[k] for k in places])
+                need(code == 0 or pull[i] + largest <= 0, "forces may be in balance")
+
     def leaf_x(self, low, high, codes, rows, text):
         """[8.3] (6.1) at every alpha of the piece: a polynomial of degree four."""
+        terms = Terms(self.system, self.scale, codes, rows, text, ends=2)
+        if not self.system.rigid:
+            self.excluded(terms, low, high, None)
+            return
+        pushed = [self.data.pushed(arb(alpha)) for alpha in (low, high)]
+        turned = [in_balance(terms, end, h) for end, h in enumerate(pushed)]
+        if None in turned:
+            turned = []
+        for values in ([[arb(x) for x in part] for part in terms.values], turned):
+            try:
+                if values:
+                    self.excluded(terms, low, high, values, pushed, balanced=values is turned)
+                    return
+            except Refused as error:
+                said = error
+        raise said
+
+    def excluded(self, terms, low, high, values, loads_of_q=(), *, balanced=False):
+        """Show that multipliers exclude a leaf over a piece."""
         system, m = self.system, self.system.m
-        terms = Terms(system, self.scale, codes, rows, text, ends=2)
-        sums = [terms.sums(end) for end in (0, 1)]
+        sums = [terms.sums(end, values and values[end]) for end in (0, 1)]
         loads = [system.load(arb(alpha)) for alpha in (low, high)]
         radii = [[system.radius(i, arb(alpha)) if i < self.p else arb(0) for i in range(m)] for alpha in (low, high)]
 
@@ -196,6 +274,26 @@ class Graph:
             for k, value in enumerate(product):
                 v[k][i] += value
         left, size = [arb(0)] * 5, arb(0)
+        if loads_of_q:
+            G, ends = system.rigid[0], []
+            for k, h in enumerate(loads_of_q):
+                at = [v[0][i] + (v[1][i] + v[2][i] if k else 0) for i in range(m)]
+                image = system.inverse * G.transpose()
+                right = 2 * column(h) - image.transpose() * column(at)
+                ends.append([x.mid() for x in (G * image).solve(right).entries()])
+            z, h = affine(*ends), affine(*loads_of_q)
+            for j, (a, b) in enumerate(zip(z, h, strict=True)):
+                for k, value in enumerate(_times(a, b)):
+                    left[k] += value
+                for k in (0, 1):
+                    for i in range(m):
+                        v[k][i] += G[j, i] * a[k]
+            # G y - h is affine and rho'|G y - h| convex: not above its chord
+            moved = [(G * column(part[2])).entries() for part in sums]
+            off = [[-a - b for a, b in zip(*two, strict=True)] for two in zip(moved, loads_of_q, strict=True)]
+            ends = [dot(self.problem.rho, [abs(x) for x in part]) for part in off]
+            left[0] -= arb(0) if balanced else ends[0]
+            left[1] -= arb(0) if balanced else ends[1] - ends[0]
         for a, b in zip(moves, load, strict=True):
             for k, value in enumerate(_times(a, b)):
                 left[k] -= value
@@ -220,13 +318,13 @@ class Graph:
                 need(False, "there is a solution")
             return False
 
-        explore(self.system, codes, between(low, high), settled, piece=(arb(low), arb(high)))
+        explore(self.full, codes, between(low, high), settled, piece=(arb(low), arb(high)))
 
     @cached_property
     def lifted(self):
         """zeta = C y - shift - alpha slope in the variables of the tree."""
         problem, natural = self.problem, self.problem.natural
-        lift = arb_mat(3 * self.p, self.system.m)
+        lift = arb_mat(natural.m, self.full.m)
         for k, (place, factor) in enumerate(problem.tau_rows()):
             if place is not None:
                 lift[k, place] = factor
@@ -279,10 +377,11 @@ class Graph:
             spreads = [self.spread(view, across) for across in ((False, True) if view.across else (False,))]
             return any(box.has_all(*spread) for box in boxes for spread in spreads)
 
-        explore(self.system, codes, between(low, high), settled, piece=(arb(low), arb(high)))
+        explore(self.full, codes, between(low, high), settled, piece=(arb(low), arb(high)))
 
     def leaf_k(self, low, high, codes, first, last, numbers=None):
         if numbers is not None:
+            need(not self.system.rigid, "a form of a body that nothing holds")
             self.by_form(low, high, codes, numbers, first, last)
             return
         curve, begin = self.box(first)
@@ -298,7 +397,7 @@ class Graph:
         need(all(a == b or min(a, b) >= 12 for a, b in zip(codes, leaf, strict=True)), "a leaf of other statuses")
         for gap in curve.gaps():
             need(not gap.overlaps(between(first, last)), "the curve ends here")
-        found = roots_of(self.system, tuple(leaf), arb(alpha))
+        found = roots_of(self.full, tuple(leaf), arb(alpha))
         need(len(found) == 1, "no root in the leaf")
         spread = self.spread(found[0].view)
         need(curve.boxes[k].has_all(*spread), "the root is not in the box")

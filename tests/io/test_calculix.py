@@ -122,7 +122,7 @@ def test_a_point_of_a_continuum_is_found():
         ("    1C\n", "has no displacements"),
         (f"    2C{2:30d}{2:38d}\n", "binary"),
         (f"    2C{1:30d}{1:38d}\n -1         1 0.00000E+00\n", "ends within a block"),
-        (f"    2C{1:30d}{1:38d}\n -1         1 x.00000E+00 0.00000E+00\n -3\n", "is damaged"),
+        (f"    2C{1:30d}{1:38d}\n -1         1 x.00000E+00 0.00000E+00\n -3\n", "does not hold results"),
     ],
 )
 def test_damaged_files_are_refused(tmp_path, content, message):

@@ -187,7 +187,7 @@ def test_ranges_with_a_gap_exclude_nothing_along_an_arc(monkeypatch):
 
     def with_a_gap(search):
         proven = run(search)
-        return dataclasses.replace(proven, ranges=proven.ranges[1:])
+        return dataclasses.replace(proven, leaves=proven.leaves[1:])
 
     monkeypatch.setattr(StabilitySearch, "run", with_a_gap)
     assert {span.verdict for span in ArcStabilities(problem).spans(arc)} == {"undecided"}

@@ -9,7 +9,7 @@ from linear_motions import random_motion, setting
 
 from enumsol.arithmetic.balls import Ball
 from enumsol.search.stability import StabilitySearch
-from enumsol.trusted.running_away import Behaviour, Growing, Motions, NoMotion, Touching, covers, everywhere
+from enumsol.trusted.running_away import Behaviour, Growing, Motions, NoMotion, Touching, covers, left_open
 
 
 def numbers(rng, value):
@@ -68,7 +68,7 @@ def check(seed, count):
     judged = [mu for mu, *_ in growing_motions(*data)]
     proven = StabilitySearch(stiffness, motions).run()
     k, accepted = len(motions.signed), 0
-    leaves = [leaf for _, _, own in proven.ranges for leaf in own]
+    leaves = list(proven.leaves)
     leaves = leaves or [NoMotion(0.0, 1.0, None, (), (), np.eye(k), (np.zeros((k, k)),) * 2)]
     growing = [certificate for certificate, _ in proven.growing]
     growing = growing or [Growing(0.5, 2.0, Behaviour(tuple(range(motions.limits)), (0,) * len(motions.touching)))]
@@ -126,7 +126,7 @@ def test_forged_weights():
     # that it stays or slides are two things, and both are needed
     stays = leaf(1, high=np.inf, beside=-0.01, stays=(0,))
     assert stays.holds(stiffness, motions)
-    assert not everywhere([(0.0, np.inf, [stays])])
+    assert left_open([stays]) == (0.0, np.inf)
     assert not leaf(1, stays=(0,), slides=(0,)).holds(stiffness, motions)
     assert not leaf(1, stays=(0, 0)).holds(stiffness, motions)
     assert not leaf(1, stays=(1,)).holds(stiffness, motions)
@@ -139,12 +139,11 @@ def test_ranges_that_leave_something_out():
     assert not covers(one[1:])
     assert not covers([])
     whole = leaf(2), leaf(2, low=1.0, high=np.inf)
-    assert everywhere([(0.0, 1.0, whole[:1]), (1.0, np.inf, whole[1:])])
-    assert not everywhere([(0.0, 1.0, whole[:1]), (1.5, np.inf, whole[1:])])
-    assert not everywhere([(0.0, np.inf, whole[:1])])
-    assert not everywhere([(0.5, np.inf, whole[1:])])
-    assert not everywhere([(0.0, 1.0, whole[:1])])
-    assert not everywhere([])
+    assert left_open(whole) is None
+    assert left_open([whole[0], leaf(2, low=1.5, high=np.inf)]) == (1.0, 1.5)
+    assert left_open(whole[:1]) == (1.0, np.inf)
+    assert left_open(whole[1:]) == (0.0, 1.0)
+    assert left_open([]) == (0.0, np.inf)
 
 
 def test_a_node_that_touches_and_leans():

@@ -102,6 +102,10 @@ class TracedProblem:
     def _precise_system(self) -> PreciseSystem | None:
         return PreciseSystem.of(self.problem) if affordable(self.problem) else None
 
+    def system(self, side: float) -> ArcSystem:
+        """All selections in double arithmetic."""
+        return self._systems[side]
+
     def selection(self, codes: Codes, side: float) -> ArcSelection:
         """A selection in double arithmetic."""
         if (codes, side) not in self._selections:

@@ -1,34 +1,45 @@
 """Pieces of the interval that need no tree: their one branch of solutions is proven to be all (theory, section 7.15).
 
 A branch is followed in floats, selection by selection, and the trusted core tests whether the root of each is the only
-solution where it holds. Then the selections are traced, and their arcs must join to one chain over the pieces.
+solution where it holds; of a body that nothing holds, below assignments that cover all (theory, section 14.16). Then
+the selections are traced, and their arcs must join to one chain over the pieces.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
+from fractions import Fraction
+from functools import partial
 from itertools import pairwise
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from enumsol.branches.enclosed.joining import EventPlaceKind, Joined, join
+from enumsol.proof.leaves import Excluded, OnlyReference, Unbalanced
 from enumsol.search.chains import Chains, Link, LoadedSystem, SelectionCurve
+from enumsol.search.interval_tree import EmptyLeaf, Subtree
 from enumsol.search.reduction import WeightSource
-from enumsol.search.subintervals import Piece, whole_pieces
+from enumsol.search.reference_closer import NUMBERS, Cover, OnlyRoot
+from enumsol.search.solvers import Solvers
+from enumsol.search.subintervals import ClosedPiece, Piece, Task, Worker, whole_pieces
+from enumsol.selections.float_selections import SIGN_TOLERANCE
 from enumsol.support.deadlines import look
-from enumsol.trusted.arcs.only_branch import only_roots
+from enumsol.trusted.arcs.only_branch import branch_references, only_roots
+from enumsol.trusted.floating_bounds import motion_against, without_bound
 from enumsol.trusted.over_interval import PieceNumbers
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
-    from fractions import Fraction
 
     from enumsol.branches.enclosed.cutting import Trace
     from enumsol.branches.enclosed.following import TracedProblem
     from enumsol.support.array_types import Codes
     from enumsol.trusted.arcs.selection_balls import ArcSelection
 
+    Span = tuple[ArcSelection, float, float]
+    Record = OnlyReference | Unbalanced | Excluded
+    Leaf = tuple[Codes, Record]
     Spans = list[tuple[Codes, float, float]]
 
 #: Halvings of the interval, and of a piece some of whose arcs are not proven to hold all solutions.
@@ -41,6 +52,10 @@ _VAIN_TRIES = 3
 #: Bounds of errors are multiplied by the first, and the form must be definite by the second, so that a checker that
 #: rounds otherwise agrees.
 _ERRORS, _MARGIN = 2.0, 1e-9
+#: Of theta along an arc of a body that nothing holds, one after the other.
+_DEGREES = 1, 2, 4, 8
+#: Of a tree below an assignment that nothing else excludes.
+_MOST_NODES = 4096
 
 
 @dataclass
@@ -49,17 +64,17 @@ class ClosedPieces:
 
     Attributes
     ----------
-    pieces : mapping of Piece to (PieceNumbers, codes)
+    pieces : mapping of Piece to ClosedPiece
         In order, with the selections that hold somewhere in them.
     traces : list of Trace
         Of these selections, where they survive.
     """
 
-    pieces: dict[Piece, tuple[PieceNumbers, list[Codes]]] = field(default_factory=dict)
+    pieces: dict[Piece, ClosedPiece] = field(default_factory=dict)
     traces: list[Trace] = field(default_factory=list)
 
-    def find(self, traced: TracedProblem) -> None:
-        """Find those of a problem.
+    def find(self, traced: TracedProblem, worker: Worker | None = None) -> None:
+        """Find those of a problem, with a worker for what of a body that nothing holds needs a tree.
 
         Raises
         ------
@@ -67,7 +82,7 @@ class ClosedPieces:
             At the deadline; what was found by then is kept.
         """
         for whole in whole_pieces(*traced.interval, traced.origin):
-            for stretch in _stretches(_Proposals(traced, whole).run()):
+            for stretch in _stretches(_Proposals(traced, whole, worker).run()):
                 look()
                 self._add_proven(traced, stretch)
 
@@ -83,7 +98,7 @@ class ClosedPieces:
         origin = traced.origin if traced.origin in ends else None
         joined = join(traces, ends, origin, traced.sharpen, sparing=traced.sparing)
         if _is_chain(joined) and all(_was_tested(joined, proposed) for proposed in stretch):
-            self.pieces |= {p.piece: (p.numbers, [codes for codes, _, _ in p.spans]) for p in stretch}
+            self.pieces |= {proposed.piece: proposed.closed for proposed in stretch}
             self.traces += traces
 
 
@@ -94,6 +109,13 @@ class _Proposed:
     piece: Piece
     numbers: PieceNumbers
     spans: Spans
+    leaves: Sequence[Leaf] = ()
+    bounded: bool = False
+
+    @property
+    def closed(self) -> ClosedPiece:
+        """What is kept of it."""
+        return ClosedPiece(self.numbers, [codes for codes, _, _ in self.spans], self.leaves, self.bounded)
 
 
 def _stretches(proposals: Sequence[_Proposed]) -> list[list[_Proposed]]:
@@ -129,6 +151,10 @@ def _was_tested(joined: Joined, proposed: _Proposed) -> bool:
     return True
 
 
+def _record(why: OnlyRoot | Record) -> Record:
+    return OnlyReference(1, why.rows, why.products) if isinstance(why, OnlyRoot) else why
+
+
 class _Proposals:
     """Proposals for one side of an alpha at which g vanishes, or for the whole interval.
 
@@ -136,17 +162,26 @@ class _Proposals:
     ----------
     traced : TracedProblem
     whole : Piece
+    worker : Worker or None
     """
 
-    def __init__(self, traced: TracedProblem, whole: Piece) -> None:
-        self._traced, self._whole = traced, whole
+    def __init__(self, traced: TracedProblem, whole: Piece, worker: Worker | None) -> None:
+        self._traced, self._whole, self._worker = traced, whole, worker
         self._side = traced.spans([(whole.a, whole.b)])[0][2]
-        self._system = LoadedSystem(traced.problem.condensed, traced.units, self._side)
+        held = traced.problem.held
+        self._system = LoadedSystem(
+            traced.problem.on_springs.condensed, traced.units, self._side, None if held else self._root
+        )
+        if not held:
+            self._arcs = arcs = traced.system(self._side)
+            self._system = self._system.bordered(arcs.S.mid, (arcs.g0.mid, arcs.g1.mid), arcs.reach)
         self._chains = Chains(self._system, float(whole.b))
         # how far around a link the test goes, by the length of the interval: its ends are known in floats only
         self._around = 1e-9 * float(whole.b - whole.a)
         ones = np.ones(self._system.p)
         self._numbers = [PieceNumbers(ones, ones, 0.0 * ones)]
+        if not held:
+            self._numbers = [PieceNumbers(mu * ones, ones, 0.0 * ones, balance, mu) for mu, balance in NUMBERS]
         self._vain = _VAIN + self._system.p // _NODES_FOR_ONE
 
     def run(self) -> list[_Proposed]:
@@ -177,6 +212,8 @@ class _Proposals:
             for link in links
         ]
         asked = [(self._traced.selection(codes, self._side), low, high) for codes, low, high in spans]
+        if not self._traced.problem.held:
+            return self._covered(piece, spans, asked), True
         alone = list[bool]()
         for numbers in self._numbers:
             alone = self._only(asked, numbers)
@@ -195,6 +232,52 @@ class _Proposals:
                 return (_Proposed(piece, found, spans) if all(self._only(asked, found)) else None), True
         beside = [(asked[0][0], ends[0], ends[0] + self._around), (asked[-1][0], ends[1] - self._around, ends[1])]
         return None, some or any(self._only(beside, self._numbers[0]))
+
+    def _covered(self, piece: Piece, spans: Spans, asked: Sequence[Span]) -> _Proposed | None:
+        """A piece of a body that nothing holds, with leaves that leave nothing beside its arcs; or None."""
+        system, (low, high) = self._arcs, self._traced.spans([(piece.a, piece.b)])[0][:2]
+
+        ends = system.at(low), system.at(high)
+
+        def unbalanced(codes: Codes) -> Record | None:
+            z = motion_against(ends[0], codes, ends[1])
+            return Unbalanced(z) if system.unbalanced(codes, low, high, z) else None
+
+        # if possible without the bound of the rigid displacement
+        free = without_bound(system.at(low, high)).reach
+        for degree in _DEGREES:
+            tried = ((one, branch_references(asked, one, _ERRORS)) for one in self._of_degree(degree))
+            numbers, references = next(((one, found) for one, found in tried if found), (self._numbers[0], []))
+            for reach in (free, system.reach) if references else ():
+                found = Cover(references, reach).leaves(unbalanced, partial(self._searched, piece))
+                if found is not None:
+                    leaves = [(codes, _record(why)) for codes, why in found]
+                    bounded = reach is system.reach or self._need_bound(piece, leaves)
+                    return _Proposed(piece, numbers, spans, leaves, bounded)
+        return None
+
+    def _searched(self, piece: Piece, codes: Codes) -> list[tuple[Codes, Record]] | None:
+        """The leaves of a tree below an assignment in which there is nothing; None where there may be something."""
+        if self._worker is None:
+            return None
+        result = self._worker.run(Task(piece, (Subtree(codes),)), _MOST_NODES)
+        if result.selections or result.cut or result.rest:
+            return None
+        return [(leaf.codes, Excluded(leaf.rows, leaf.values)) for leaf in result.empty]
+
+    def _need_bound(self, piece: Piece, leaves: Sequence[Leaf]) -> bool:
+        """True if a leaf of a tree rests on the bound of the rigid displacement."""
+        empty = [EmptyLeaf(codes, *said.terms) for codes, said in leaves if isinstance(said, Excluded)]
+        worker = self._worker
+        needs = (worker is None or worker.leaves.needs_bound(piece, worker.system(piece), leaf) for leaf in empty)
+        return any(needs)
+
+    def _of_degree(self, degree: int) -> list[PieceNumbers]:
+        return [replace(numbers, degree=degree) for numbers in self._numbers]
+
+    def _root(self, alpha: float) -> Codes | None:
+        """The selection of a root of a body that nothing holds."""
+        return Solvers(self._traced.problem, Fraction(alpha), "verified", SIGN_TOLERANCE, None).known_root
 
     def _only(self, asked: Sequence[tuple[ArcSelection, float, float]], numbers: PieceNumbers) -> list[bool]:
         return only_roots(asked, numbers, _ERRORS, _MARGIN)

@@ -80,6 +80,13 @@ class VerifiedIntervalCertifier(IntervalCertifier):
             return False
         return all(one.smallest_eigenvalue > 0 for one in self._with_form(enclosed, form).forms)
 
+    def needs_bound(self, piece: Piece, system: IntervalSystem, leaf: EmptyLeaf) -> bool:
+        """True unless a leaf is excluded without a bound of the rigid displacement."""
+        enclosed = self._on(piece, system)[0]
+        return (
+            enclosed is None or not exclusion_margin(enclosed.unbounded, leaf.codes, leaf.rows, leaf.values) > _MARGIN
+        )
+
     def _with_form(self, enclosed: EnclosedPiece, form: Floats) -> EnclosedPiece:
         if self._form is None or self._form[0] is not form or self._form[1].ends is not enclosed.ends:
             self._form = form, enclosed.with_form(form)

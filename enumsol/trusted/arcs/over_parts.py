@@ -140,7 +140,7 @@ class Expansion:
     @cached_property
     def unbalanced(self) -> bool:
         """True if no forces of the selection are in balance with the load anywhere in the interval."""
-        return self.selection.unbalanced(self.low, self.high)
+        return self.selection.system.unbalanced(self.selection.rows.codes, self.low, self.high)
 
     def over(self, low: float, high: float) -> OverInterval:
         """Knowledge of a part of the interval."""
@@ -169,7 +169,7 @@ def expansions(asked: Sequence[Asked], errors: float = 1.0) -> list[Expansion | 
 
 def _nowhere(selection: ArcSelection, low: float, high: float) -> OverInterval | None:
     """Knowledge of an interval in which no forces of a selection are in balance with the load (theory, (14.7))."""
-    if not selection.unbalanced(low, high):
+    if not selection.system.unbalanced(selection.rows.codes, low, high):
         return None
     unknown = np.zeros(len(selection.rows.conditions), dtype=np.int8)
     return OverInterval(unknown, False, True, 0, (unknown, unknown), unknown)

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from enumsol.arithmetic.balls import SAFE, TINY, Ball, solution
+from enumsol.arithmetic.balls import SAFE, TINY, Ball, hull, solution
 from enumsol.condensation.enclosure import CondensedEnclosure, EnclosedSystem, NotEnclosedError, RigidRows
 from enumsol.trusted.floating_bounds import is_unbalanced, motion_against
 from enumsol.trusted.selection import Selection
@@ -86,6 +86,36 @@ class ArcSystem:
         """Number of contact nodes."""
         return len(self.F0)
 
+    @property
+    def contact(self) -> Ball:
+        """Compliance of the contact nodes, without the rows of the body as a whole, (2p, 2p)."""
+        inner = slice(2 * self.p)
+        return self.S[inner, inner]
+
+    @property
+    def rigid(self) -> Ball:
+        """Rows of the body as a whole, (r, 2p)."""
+        return self.S[2 * self.p :, : 2 * self.p]
+
+    def at(self, *alphas: float) -> EnclosedSystem:
+        """The system at one alpha, or in balls that hold all between two, of a body that nothing holds."""
+        F = hull([_affine(Ball.exact(self.F0), Ball.exact(self.F1), alpha) for alpha in alphas])
+        g, S = hull([_affine(self.g0, self.g1, alpha) for alpha in alphas]), self.contact
+        zero, one, contact = np.zeros(len(self.reach)), np.ones(len(self.reach)), slice(2 * self.p)
+        rows = RigidRows(self.rigid, g[2 * self.p :], Ball.exact(zero), one, self.reach)
+        return EnclosedSystem(S.mid, S.rad, g.mid[contact], g.rad[contact], F.mid, F.rad, rows=rows)
+
+    def unbalanced(self, codes: Sequence[int], low: float, high: float, z: Floats | None = None) -> bool:
+        """True if no forces below an assignment are in balance with the load anywhere between two alphas.
+
+        By one motion z for all of them (theory, (14.7)), of a body that nothing holds; by default one is sought.
+        """
+        if not len(self.reach):
+            return False
+        ends = [self.at(alpha) for alpha in (low, high)]
+        z = motion_against(ends[0], codes, ends[1]) if z is None else z
+        return all(is_unbalanced(end, codes, z) for end in ends)
+
 
 class ArcSelection:
     """A selection as a function of alpha, in balls of double arithmetic.
@@ -131,29 +161,6 @@ class ArcSelection:
             return 0
         value, radius = float(found[2].mid[condition]), SAFE * float(found[2].rad[condition])
         return int(value > radius) - int(value < -radius)
-
-    def unbalanced(self, low: float, high: float) -> bool:
-        """True if no forces of the selection are in balance with the load anywhere between two alphas.
-
-        By one motion for all of them (theory, (14.7)), of a body that nothing holds.
-        """
-        ends = [self._at_end(alpha) for alpha in (low, high)] if len(self.system.reach) else []
-        z = motion_against(ends[0], self.rows.codes) if ends else None
-        return z is not None and all(is_unbalanced(end, self.rows.codes, z) for end in ends)
-
-    def _at_end(self, alpha: float) -> EnclosedSystem:
-        system, contact = self.system, slice(2 * self.system.p)
-        F = _affine(Ball.exact(system.F0), Ball.exact(system.F1), alpha)
-        g = _affine(system.g0, system.g1, alpha)
-        rigid, S = slice(2 * system.p, None), system.S[contact, contact]
-        rows = RigidRows(
-            system.S[rigid, contact],
-            g[rigid],
-            Ball.exact(np.zeros(len(system.reach))),
-            np.ones(len(system.reach)),
-            system.reach,
-        )
-        return EnclosedSystem(S.mid, S.rad, g.mid[contact], g.rad[contact], F.mid, F.rad, rows=rows)
 
     @cached_property
     def forms(self) -> tuple[Floats, Floats, Floats, Floats]:
