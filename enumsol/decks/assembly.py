@@ -8,7 +8,7 @@ import numpy as np
 
 from enumsol.decks.cards import DeckPlace, key, shown
 from enumsol.decks.faces import named_faces
-from enumsol.decks.model import Account, Deck, DeckRegion, Members, RigidProfile, Surface
+from enumsol.decks.model import Account, Deck, DeckRegion, Members, RigidProfile, Surface, by_block
 from enumsol.decks.registry import Reading
 from enumsol.decks.rigid import add_layers, add_profiles
 from enumsol.errors import InvalidArgumentError
@@ -193,12 +193,8 @@ class _Whole:
 
     def _nodes(self, elements: Integers) -> Integers:
         """Rows of the nodes of elements."""
-        found, first = [_NONE], 0
-        for block in self.deck.blocks:
-            own = elements[(elements >= first) & (elements < first + len(block.labels))] - first
-            found.append(block.nodes[own].ravel())
-            first += len(block.labels)
-        return np.unique(np.concatenate(found))
+        found = [block.nodes[own].ravel() for _, block, own in by_block(self.deck.blocks, elements)]
+        return np.unique(np.concatenate([_NONE, *found]))
 
     def surface(self, name: str, members: Members) -> Surface:
         """A surface by the rows of its elements or nodes."""

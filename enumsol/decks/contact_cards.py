@@ -83,7 +83,7 @@ def friction(reading: Reading, given: Card) -> str:
     *("CONTACT PAIR", "INTERACTION", "ADJUST", "TIED", "SMALL SLIDING"),
     unused=(
         *("TYPE", "TRACKING", "NO THICKNESS", "HCRIT", "EXTENSION ZONE", "SMOOTH", "SUPPLEMENTARY CONSTRAINTS"),
-        *("MECHANICAL CONSTRAINT", "CPSET", "WEIGHT", "OP"),
+        *("MECHANICAL CONSTRAINT", "CPSET", "WEIGHT", "OP", "SLIDING TRANSITION", "MINIMUM DISTANCE"),
     ),
 )
 def contact_pair(reading: Reading, given: Card) -> str:

@@ -8,7 +8,7 @@ import numpy as np
 
 from enumsol.decks.cards import DeckPlace
 from enumsol.decks.elements import EDGES, Shape, shape_of
-from enumsol.decks.model import Deck
+from enumsol.decks.model import Deck, by_block
 from enumsol.errors import InvalidArgumentError
 from enumsol.support.array_types import Integers
 
@@ -33,16 +33,12 @@ def named_faces(deck: Deck, elements: Integers, label: str, place: DeckPlace) ->
     InvalidArgumentError
         The elements have no such face.
     """
-    found, first = [_NO_FACES], 0
-    for block in deck.blocks:
-        own = elements[(elements >= first) & (elements < first + len(block.labels))]
-        first += len(block.labels)
-        if not len(own):
-            continue
+    found = [_NO_FACES]
+    for first, block, own in by_block(deck.blocks, elements):
         faces = block.type.shape.faces if deck.is_body(block) else ()
         if not label and faces:
             free = free_faces(deck)
-            found.append(free[np.isin(free[:, 0], own)])
+            found.append(free[np.isin(free[:, 0], first + own)])
             continue
         if not faces and block.type.shape.dimension and label in ("", "SPOS", "SNEG", "S1", "S2"):
             number = -2 if label == "SNEG" else -1
@@ -54,7 +50,7 @@ def named_faces(deck: Deck, elements: Integers, label: str, place: DeckPlace) ->
                 f"{place}: *SURFACE names the face {label or 'of no name'} of elements of type {block.type.name}; "
                 f"expected {expected}"
             )
-        found.append(np.column_stack([own, np.full(len(own), number)]))
+        found.append(np.column_stack([first + own, np.full(len(own), number)]))
     return np.concatenate(found)
 
 

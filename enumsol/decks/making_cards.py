@@ -7,7 +7,7 @@ from collections.abc import Callable
 import numpy as np
 
 from enumsol.decks.cards import Card, key
-from enumsol.decks.model import DeckRegion, ElementBlock
+from enumsol.decks.model import DeckRegion, ElementBlock, by_block
 from enumsol.decks.registry import Reading, card
 from enumsol.support.array_types import Floats, Integers
 from enumsol.support.messages import counted
@@ -208,10 +208,4 @@ def _elements(reading: Reading, given: Card, labels: Integers, row: int | None) 
     known = np.concatenate([np.zeros(0, dtype=np.int64), *(block.labels for block in blocks)])
     expected = "which does not stand before it; expected it in *ELEMENT"
     rows = _rows(known, labels, lambda element: given.refused(f"names the element {element}, {expected}", row))
-    found, first = [], 0
-    for block in blocks:
-        own = rows[(rows >= first) & (rows < first + len(block.labels))] - first
-        if len(own):
-            found.append((block, own))
-        first += len(block.labels)
-    return found
+    return [(block, own) for _, block, own in by_block(blocks, rows)]

@@ -7,6 +7,7 @@ elements for everything, and sets and surfaces by the rows in these.
 
 from __future__ import annotations
 
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
@@ -60,6 +61,16 @@ class ElementBlock:
     labels: Integers
     nodes: Integers
     place: DeckPlace
+
+
+def by_block(blocks: Iterable[ElementBlock], rows: Integers) -> Iterator[tuple[int, ElementBlock, Integers]]:
+    """Blocks that some rows of elements belong to: the first row of each, the block, and rows in it."""
+    first = 0
+    for block in blocks:
+        own = rows[(rows >= first) & (rows < first + len(block.labels))] - first
+        if len(own):
+            yield first, block, own
+        first += len(block.labels)
 
 
 @dataclass(eq=False)

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from enumsol.decks.model import by_block
 from enumsol.errors import InvalidArgumentError
 
 if TYPE_CHECKING:
@@ -172,13 +173,10 @@ def _given_to(deck: Deck, act: Act) -> list[tuple[Key, float]]:
 
 def _check_face(deck: Deck, rows: Integers, act: Act) -> None:
     """Refuse loads on faces that elements do not have."""
-    first = 0
-    for block in deck.blocks:
-        own = rows[(rows >= first) & (rows < first + len(block.labels))]
-        first += len(block.labels)
+    for first, block, own in by_block(deck.blocks, rows):
         faces = len(block.type.shape.faces)
-        if len(own) and not 1 <= int(act.label[1:]) <= faces:
+        if not 1 <= int(act.label[1:]) <= faces:
             raise InvalidArgumentError(
-                f"{act.place}: *DLOAD loads {act.label} of element {deck.element_name(int(own[0]))} of type "
+                f"{act.place}: *DLOAD loads {act.label} of element {deck.element_name(first + int(own[0]))} of type "
                 f"{block.type.name}, which has {faces} faces; expected one of these"
             )

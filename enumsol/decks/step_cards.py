@@ -43,6 +43,7 @@ _WORDS = {"BOUNDARY": "displacements", "CLOAD": "forces", "DLOAD": "loads", "TEM
 
 harmless("all equilibria at the end of a step are found, without increments", *(
     "CONTROLS", "CONTACT CONTROLS", "SOLVER CONTROLS", "TIME POINTS", "NO ANALYSIS", "ANALYSIS CONTROLS",
+    "CONTACT STABILIZATION", "WAVEFRONT MINIMIZATION", "CONSTRAINT CONTROLS",
 ))  # fmt: skip
 harmless("it asks for output", "FILTER")
 harmless("the analysis is static", "DAMPING", "GLOBAL DAMPING", "MODAL DAMPING", "CONTACT DAMPING", "DASHPOT")
@@ -241,7 +242,7 @@ def _act(
 ) -> Act:
     """Act of one line."""
     named = entries[0] if entries else ""
-    if not named:
+    if not named and label != "GRAV":  # which acts on all elements then
         raise given.refused("has a line without a node, an element or a set; expected one of them", row)
     target = named if is_number(named) else key(named)
     return Act(given.name, given.at(row), target, label, components, values, given.name_of("AMPLITUDE") or None)
@@ -280,5 +281,5 @@ def _given(reading: Reading, given: Card, kind: str, acts: list[Act]) -> str:
 
 
 def _some(names: Iterator[str]) -> str:
-    every = list(dict.fromkeys(names))
+    every = [name or "all elements" for name in dict.fromkeys(names)]
     return ", ".join(every[:3]) + (f" and {len(every) - 3} more" if len(every) > 3 else "") or "nothing"

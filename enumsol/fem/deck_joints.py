@@ -13,6 +13,7 @@ import numpy as np
 
 from enumsol.decks.cards import is_number
 from enumsol.decks.faces import face_nodes
+from enumsol.decks.model import by_block
 from enumsol.errors import InvalidArgumentError
 
 if TYPE_CHECKING:
@@ -150,11 +151,8 @@ class DeckJoints:
         elif name in deck.node_sets or is_number(name.rpartition(".")[2]):
             rows = deck.nodes_of(name, given.place)
         else:
-            elements, first, found = deck.elements_of(name, given.place), 0, [np.zeros(0, dtype=np.int64)]
-            for block in deck.blocks:
-                here = elements[(elements >= first) & (elements < first + len(block.labels))] - first
-                found.append(block.nodes[here].ravel())
-                first += len(block.labels)
+            elements = deck.elements_of(name, given.place)
+            found = [block.nodes[own].ravel() for _, block, own in by_block(deck.blocks, elements)]
             rows = np.unique(np.concatenate(found))
         rows = self.parts.in_bodies(rows)
         if not len(rows):
@@ -197,12 +195,9 @@ class DeckJoints:
             self._add("equations", {"terms": terms})
 
     def _springs(self, given: Spring) -> None:
-        elements, first = self.deck.elements_of(given.elements, given.place), 0
-        for block in self.deck.blocks:
-            own = elements[(elements >= first) & (elements < first + len(block.labels))] - first
-            first += len(block.labels)
-            if len(own):
-                self._springs_of(given, block, own)
+        elements = self.deck.elements_of(given.elements, given.place)
+        for _, block, own in by_block(self.deck.blocks, elements):
+            self._springs_of(given, block, own)
 
     def _springs_of(self, given: Spring, block: ElementBlock, own: Integers) -> None:
         """Springs of one type: SPRING1 to the ground and SPRING2 by components, SPRINGA along the line."""

@@ -353,7 +353,8 @@ def _temperatures(deck: Deck, parts: DeckParts, state: DeckState) -> list[float]
     given = state.of("TEMPERATURE")
     if not given:
         return []
-    if all(material.expansion is None for material in deck.materials.values()):
+    used = [deck.materials[section.material].expansion for section, _ in elastic_sections(deck)]
+    if not any(np.any(expansion) for expansion in used if expansion is not None):
         parts.told(next(place for key, place in state.places.items() if key[0] == "TEMPERATURE"), "TEMPERATURE",
                    "not used: no material has *EXPANSION")  # fmt: skip
         return []
@@ -370,7 +371,7 @@ def _volume_forces(deck: Deck, parts: DeckParts, state: DeckState) -> dict[str, 
     total: dict[int, Floats] = {}
     for (target, direction), value in state.of("GRAV").items():
         place = state.places["GRAV", target, direction]
-        wanted = deck.elements_of(str(target), place)
+        wanted = deck.elements_of(str(target), place) if target else np.arange(len(deck.element_labels))
         axis = np.array([float(part) for part in str(direction).split()])
         for section, rows in elastic_sections(deck):
             density = deck.materials[section.material].density

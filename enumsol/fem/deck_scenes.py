@@ -154,7 +154,6 @@ class DeckModel:
 
     def __post_init__(self) -> None:
         states = self._states()
-        refuse_carriers(self.deck)
         self._parts = DeckParts(self.deck)
         common = shared(self.deck, self._parts)
         joints = DeckJoints(self.deck, self._parts, 2 if is_plane(self.deck) else 3)
@@ -170,6 +169,7 @@ class DeckModel:
             )
         if not steps[-1].ended:
             raise InvalidArgumentError(f"{steps[-1].place}: *STEP has no *END STEP; expected it")
+        refuse_carriers(self.deck)
         return states_of(self.deck)
 
     @property

@@ -105,7 +105,7 @@ class GrowingMotions:
         unit = float(np.exp2(np.round(np.log2(known.low))))
         below, above = (unit / 4, unit / STRIDE, unit / STRIDE**2, 0.0), [unit * STRIDE**k for k in range(1, 6)]
         for pushed, definite in ((below, above), (above, below)):
-            end = next((mu for mu in definite if self._definite_at(mu)), None)
+            end = next((mu for mu in definite if serve_at(self.stiffness, self.motions, mu)), None)
             if end is None:
                 continue
             for mu in pushed:
@@ -117,11 +117,6 @@ class GrowingMotions:
                 if tried.holds(self.stiffness, self.motions):
                     return tried
         return None
-
-    def _definite_at(self, mu: float) -> bool:
-        """True if plain numbers serve at one mu, in floats."""
-        K = self.stiffness.at(mu)
-        return K is not None and serves(self.motions, K.mid)
 
     def zero_near(self, known: Growing) -> float | None:
         """About the mu at which a motion grows that grew at another one under slightly other coefficients."""
@@ -189,6 +184,12 @@ class GrowingMotions:
                 chosen[backward] = False
             else:
                 chosen[inward[np.argmin(r[inward])]] = True
+
+
+def serve_at(stiffness: DynamicStiffness, motions: Motions, mu: float) -> bool:
+    """True if plain numbers make the form definite at one mu, in floats."""
+    K = stiffness.at(mu)
+    return K is not None and serves(motions, K.mid)
 
 
 def serves(motions: Motions, K: Floats) -> bool:

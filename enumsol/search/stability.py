@@ -18,6 +18,7 @@ from enumsol.search.growing_motions import (
     STRIDE,
     GrowingMotions,
     largest_eigenvalue,
+    serve_at,
     serves,
     smallest_eigenvalue,
 )
@@ -113,8 +114,7 @@ class StabilitySearch:
 
     def _serve_to(self, low: float, high: float) -> bool:
         """True if plain numbers serve in a long range."""
-        K = self.stiffness.at(high)
-        return K is not None and serves(self.motions, K.mid) and self._try(low, high)
+        return serve_at(self.stiffness, self.motions, high) and self._try(low, high)
 
     @cached_property
     def _limit(self) -> Floats | None:
@@ -146,8 +146,7 @@ class StabilitySearch:
 
     def _by_plain(self, low: float, high: float) -> bool | None:
         """Whether plain numbers serve in a range."""
-        ends = [self.stiffness.at(mu) for mu in (low, high)]
-        serving = [K is not None and serves(self.motions, K.mid) for K in ends]
+        serving = [serve_at(self.stiffness, self.motions, mu) for mu in (low, high)]
         return (all(serving) and self._try(low, high)) if any(serving) else None
 
     def _try(self, low: float, high: float, weights: Floats | None = None, products: Floats | None = None) -> bool:

@@ -19,6 +19,7 @@ from typing import TYPE_CHECKING, Any
 from enumsol.proof.writer import KeptRecords
 from enumsol.search.certifiers.protocol import NO_BOUND, Bound, Certifier, Refine, UndecidedPart
 from enumsol.search.closing import TreeCloser
+from enumsol.search.lookahead import Lookahead
 from enumsol.search.nodes import Relaxations, TreeNode
 from enumsol.search.outcome import SearchLimits, SearchOutcome, SearchProgress, Stop, StopReason
 from enumsol.search.remainder import Remainder
@@ -82,6 +83,7 @@ class TreeSearch:
     ) -> None:
         self.relaxations, self.certifier = relaxations, certifier
         self.splitting, self.forms = relaxations.splitting, relaxations.forms
+        self.lookahead = Lookahead(relaxations)
         self.limits = limits or SearchLimits()
         self.progress = progress
         self.closer = closer or TreeCloser()
@@ -149,7 +151,7 @@ class TreeSearch:
                 break
             self._forget(held)
             stack = [] if self._one(start[0]) else list(start)
-        if stack and self._pays(forms):
+        if stack and (self._pays(forms) or self.lookahead.begins(self.outcome.nodes, self.covered)):
             self._forget(held)
             return list(start)
         return stack
@@ -182,6 +184,8 @@ class TreeSearch:
             if stack and self._pays(forms):
                 # from here on without the parents' relaxations, which are the energy's
                 stack = [replace(item, parent=None) if isinstance(item, TreeNode) else item for item in stack]
+            elif stack:
+                self.lookahead.begins(self.outcome.nodes, self.covered)
         self.loop(stack, None)
 
     def examined(self, items: Sequence[TreeNode], nodes: int) -> list[TreeNode]:
@@ -285,7 +289,7 @@ class TreeSearch:
         usable = relaxation if relaxation is not None and not relaxation.pruned else None
         if self.closed(item, usable):
             return []
-        node, forced = branching_node(codes, item.forced, usable, self.closer.sliding)
+        node, forced = branching_node(codes, item.forced, usable, self.closer.sliding, self.lookahead.choose)
         if node < 0:
             node = self._settle(item)
         if node < 0:

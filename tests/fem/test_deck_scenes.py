@@ -58,6 +58,7 @@ RIGHT = {
         {"pressure": None, "body_force": {"UPPER": (0, -2 * 9.81), "LOWER": (0, -3 * 9.81)}}),
     "gravity of all": (deck(mesh=MESH + "*ELSET, ELSET=EVERY\nUPPER, LOWER\n", steps=step(DOWN + "*DLOAD\nEVERY, GRAV, 9.81, 1., 0., 0.\n")),
         {"pressure": None, "body_force": {"UPPER": (2 * 9.81, 0), "LOWER": (3 * 9.81, 0)}}),
+    "gravity of all elements": (deck(steps=step(DOWN + "*DLOAD\n, GRAV, 9.81, 1., 0., 0.\n")), {"pressure": None, "body_force": {"UPPER": (2 * 9.81, 0), "LOWER": (3 * 9.81, 0)}}),
     "forces per volume": (deck(steps=step(DOWN + "*DLOAD\nUPPER, BX, 0.5\nUPPER, BY, -0.25\n12, P2, 2.\n")), {"body_force": {"UPPER": (0.5, -0.25)}}),
     "force per volume of an element": (deck(steps=step(DOWN + "*DLOAD\n12, BX, 0.5\n")), {"pressure": None, "body_force": {"LAST": (0.5, 0)}}),
     "an amplitude": (deck(materials="*AMPLITUDE, NAME=RISE\n0., 0., 0.5, 0.5,\n2., 2.\n" + MATERIALS,
@@ -132,6 +133,7 @@ WRONG = {
     "two pressures on one face": (deck(steps=step(PUSH + "*DLOAD\n12, P2, 1.\n")), r"line \d+: \*DLOAD gives P2 of element 12 the value 1, .* 2 in the same step"),
     "a load that is none": (deck(steps=step("*DLOAD\n12, HP, 1.\n")), r"line \d+: \*DLOAD has the load HP"),
     "a face that is none": (deck(steps=step("*DLOAD\n12, P5, 1.\n")), r"line \d+: \*DLOAD loads P5 of element 12 of type CPE4, which has 4 faces"),
+    "a pressure on nothing": (deck(steps=step("*DLOAD\n, P2, 1.\n")), r"line \d+: \*DLOAD has a line without a node, an element or a set"),
     "gravity without a direction": (deck(steps=step("*DLOAD\nUPPER, GRAV, 9.81\n")), r"line \d+: \*DLOAD has GRAV without a direction"),
     "gravity in a long direction": (deck(steps=step("*DLOAD\nUPPER, GRAV, 9.81, 0., -2., 0.\n")), r"line \d+: \*DLOAD has GRAV with a direction of length 2"),
     "gravity without density": (deck(materials=MATERIALS.replace("*DENSITY\n2.\n", ""), steps=step("*DLOAD\nUPPER, GRAV, 9.81, 0., -1., 0.\n")), r"line \d+: \*DLOAD has GRAV on elements of SOFT, which has no \*DENSITY"),
@@ -152,6 +154,8 @@ WRONG = {
     "large displacements, and how to do without": (deck(steps=step(DOWN, ", NLGEOM=YES")), r"line \d+: \*STEP has NLGEOM.*--ignore NLGEOM \(in Python"),
     "a frequency analysis": (deck(steps=PRESSED + "*STEP\n*FREQUENCY\n5\n*END STEP\n"), r"line \d+: \*FREQUENCY is another analysis than \*STATIC.*--ignore FREQUENCY"),
     "a surface of nodes that are no facets": (deck(mesh=MESH + "*SURFACE, NAME=POINTS, TYPE=NODE\n11\n13\n", contact=CONTACT.replace("UNDER", "POINTS")), r"line \d+: \*SURFACE POINTS has node 11, which belongs to no facet"),
+    "a surface of nodes and of faces": (deck(mesh=MESH + "*SURFACE, NAME=UNDER, TYPE=NODE\n11\n"), r"line \d+: \*SURFACE gives UNDER as nodes and as faces, also in model.inp line \d+"),
+    "a surface of faces and of nodes": (deck(mesh=MESH + "*SURFACE, NAME=P, TYPE=NODE\n11\n*SURFACE, NAME=P\n11, S1\n"), r"line \d+: \*SURFACE gives P as nodes and as faces"),
     "a surface of nodes of no body": (deck(mesh=MESH + "*NODE\n99, 9., 9.\n*SURFACE, NAME=POINTS, TYPE=NODE\n99\n", contact=CONTACT.replace("UNDER", "POINTS")), r"line \d+: \*SURFACE POINTS has no node of a body"),
     "elements that are taken out": (deck(steps=step("*MODEL CHANGE, TYPE=ELEMENT, REMOVE\n11\n")), r"line \d+: \*MODEL CHANGE changes other things"),
     "a pair that is none is taken out": (deck(steps=step("*MODEL CHANGE, TYPE=CONTACT PAIR, REMOVE\nON, UNDER\n")), r"line \d+: \*MODEL CHANGE names the pair ON:UNDER; .* UNDER:ON"),
@@ -438,6 +442,12 @@ def test_temperatures_without_initial_ones_count_from_0_and_amplitudes_count(rea
 
 def test_temperatures_where_nothing_expands_are_said_not_to_be_used(read):
     model = read(deck(steps=step(DOWN + PUSH + "*TEMPERATURE\nALL, 10.\n")))
+    assert_same(model.problem(), by_hand())
+    assert "*TEMPERATURE          not used: no material has *EXPANSION" in str(model)
+    text = deck(
+        steps=step(DOWN + PUSH + "*TEMPERATURE\nALL, 10.\n"), materials=MATERIALS.replace("2.", "2.\n*EXPANSION\n0.")
+    )
+    model = read(text + "\n")
     assert_same(model.problem(), by_hand())
     assert "*TEMPERATURE          not used: no material has *EXPANSION" in str(model)
 
