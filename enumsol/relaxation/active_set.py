@@ -207,6 +207,7 @@ class ActiveSetEngine:
     """
 
     name = "active-set"
+    solves_children = False
     #: The form that is minimised in place of the energy, if it is one at one alpha.
     form: EnclosedForm | None = None
     #: The engine of the energy, whose branching rule serves this one.

@@ -66,6 +66,8 @@ class Engine(Protocol):
     """Makes the relaxation at the root of the tree."""
 
     name: str
+    #: Its relaxations solve the children of all nodes before they choose one.
+    solves_children: bool
 
     def root(self, rows: list[int], modes: list[int]) -> Relaxation:
         """The relaxation with the given rows on."""

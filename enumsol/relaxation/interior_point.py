@@ -23,6 +23,7 @@ class InteriorPointEngine:
     """Clarabel's direct interface, one solve from scratch a node."""
 
     name = "clarabel"
+    solves_children = False
 
     def __init__(self, system: ScaledSystem) -> None:
         self.system = system

@@ -122,6 +122,7 @@ class SpaceEngine:
     """
 
     name = "active-set"
+    solves_children = True
 
     def __init__(self, system: SpaceSystem, rows: int = 24576) -> None:
         try:

@@ -24,12 +24,13 @@ NODES, FIRST = 512, 64
 
 @dataclass(frozen=True)
 class _TreeWorker:
-    """Solvers in a worker; ``form``, ``sliding`` and ``known`` are those of the search when they were sent."""
+    """Solvers in a worker; what follows ``remake`` is that of the search when they were sent."""
 
     remake: Callable[[], SearchSetup]
     form: Any
     sliding: dict[int, int]
     known: Any
+    depth: int
 
     @cached_property
     def _solvers(self) -> SearchSetup:
@@ -41,7 +42,7 @@ class _TreeWorker:
         certifier = solvers.certifier(records)
         certifier.sliding.update(self.sliding)
         search = solvers.search(certifier)
-        search.closer.known = self.known
+        search.closer.known, search.lookahead.depth = self.known, self.depth
         if search.forms is not None:
             search.forms.use(search.relaxations.engine, self.form)
         left = [item.sent() for item in search.examined(roots, nodes)]
@@ -89,13 +90,15 @@ class SpreadSearch(Spread):
     def _worker(self) -> _TreeWorker:
         search = self._search
         form = None if search.forms is None else search.forms.form
-        self._sent = _TreeWorker(self._remake, form, dict(search.certifier.sliding), search.closer.known)
+        sliding, depth = dict(search.certifier.sliding), search.lookahead.depth
+        self._sent = _TreeWorker(self._remake, form, sliding, search.closer.known, depth)
         return self._sent
 
     def _is_current(self, *, afresh: bool) -> bool:
         search, sent = self._search, self._sent
         form = None if search.forms is None else search.forms.form
-        return sent is not None and sent.form is form and not (afresh and sent.sliding != search.certifier.sliding)
+        as_sent = sent is not None and sent.form is form and sent.depth == search.lookahead.depth
+        return as_sent and sent is not None and not (afresh and sent.sliding != search.certifier.sliding)
 
     def cancel(self) -> None:
         """Cancel what has not begun."""

@@ -109,6 +109,8 @@ class Replay:
 
     def __init__(self, search: TreeSearch, reader: Reader, below: Callable[[TreeNode], None]) -> None:
         self._search, self._reader, self._below = search, reader, below
+        #: Whether the rule by which the file's tree was branched is still to be found out, from its first branchings.
+        self._learning = search.forms is not None and search.lookahead.pays
 
     def run(self, begun: BegunProof, passed: Callable[[], None]) -> list[TreeNode]:
         """Take over what holds; gives the subtrees that the file does not reach, the first one last.
@@ -130,7 +132,8 @@ class Replay:
 
     def _take(self, stack: list[TreeNode], record: list[Any]) -> bool:
         """Take one record; False if it and what follows make no sense."""
-        search = self._search
+        search, learning = self._search, self._learning
+        self._learning = False
         if record[0] == records.DeclaredForm.kind:
             try:
                 self._reader.declare(record)
@@ -149,6 +152,7 @@ class Replay:
         except ValueError:
             stack.append(item)
             return False
+        self._learning = learning and search.lookahead.learn(item.codes, split.node)
         search.certifier.branching(split.node, split.children)
         search.outcome.resumed += 1
         weight = item.weight / len(split.children)

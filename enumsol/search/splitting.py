@@ -12,7 +12,7 @@ from enumsol.relaxation.imposed_rows import status_rows
 from enumsol.trusted.status_rows import is_covering, refines
 
 if TYPE_CHECKING:
-    from collections.abc import Collection, Iterable, Mapping, Sequence
+    from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 
     from enumsol.relaxation.engine import Relaxation
     from enumsol.support.array_types import Codes, Floats
@@ -71,7 +71,11 @@ class ImposedRows:
 
 
 def branching_node(
-    codes: Codes, forced: tuple[int, ...] | None, relaxation: Relaxation | None, last: Collection[int] = ()
+    codes: Codes,
+    forced: tuple[int, ...] | None,
+    relaxation: Relaxation | None,
+    last: Collection[int] = (),
+    choose: Callable[[Codes, Relaxation], int] = lambda codes, relaxation: relaxation.choose(codes),
 ) -> tuple[int, tuple[int, ...] | None]:
     """The contact node to branch on, -1 when all are decided; and the forced ones that the children begin with.
 
@@ -81,6 +85,7 @@ def branching_node(
     forced : those of the node of the tree (see TreeNode)
     relaxation : with its minimiser, or None
     last : nodes that are branched on when no others are left
+    choose : rule that gives a node, or -1 when all are decided
     """
     if relaxation is None:
         node = next((i for i, code in enumerate(codes) if code in (CONTACT, UNDECIDED)), -1)
@@ -89,9 +94,9 @@ def branching_node(
         forced = forced or relaxation.forced(codes)
         if forced:
             return forced[0], forced[1:]
-    node = relaxation.choose(tuple(OPEN if i in last else code for i, code in enumerate(codes))) if last else -1
+    node = choose(tuple(OPEN if i in last else code for i, code in enumerate(codes)), relaxation) if last else -1
     if node < 0:
-        node = relaxation.choose(codes)
+        node = choose(codes, relaxation)
     return (node if node >= 0 else _sliding_node(codes)), None
 
 

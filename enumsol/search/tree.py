@@ -19,6 +19,7 @@ from typing import TYPE_CHECKING, Any
 from enumsol.proof.writer import KeptRecords
 from enumsol.search.certifiers.protocol import NO_BOUND, Bound, Certifier, Refine, UndecidedPart
 from enumsol.search.closing import TreeCloser
+from enumsol.search.lookahead import Lookahead
 from enumsol.search.nodes import Relaxations, TreeNode
 from enumsol.search.outcome import SearchLimits, SearchOutcome, SearchProgress, Stop, StopReason
 from enumsol.search.remainder import Remainder
@@ -39,8 +40,9 @@ if TYPE_CHECKING:
 _REPORT_EVERY = 64
 #: Number of contact nodes from which a root is sought before the tree: of fewer the tree finds one sooner.
 _MANY = 24
-#: Nodes at the limit of what contact can hold, if nothing else is to end the search: blocks in 3D with 4 contact nodes
-#: take some 1,000 and in 2D with 21 some 1,600; others had not come to an end after 8,000 and 18,000.
+#: Nodes at the limit of what contact can hold, if no other number of them is given: blocks in 2D with 21 contact
+#: nodes take some 1,600, and in 3D with 4 some 1,000; others had not come to an end after 18,000 and 8,000. In 3D an
+#: eighth of it, some seconds.
 _AT_LIMIT = 2000
 
 
@@ -81,6 +83,7 @@ class TreeSearch:
     ) -> None:
         self.relaxations, self.certifier = relaxations, certifier
         self.splitting, self.forms = relaxations.splitting, relaxations.forms
+        self.lookahead = Lookahead(relaxations)
         self.limits = limits or SearchLimits()
         self.progress = progress
         self.closer = closer or TreeCloser()
@@ -148,7 +151,7 @@ class TreeSearch:
                 break
             self._forget(held)
             stack = [] if self._one(start[0]) else list(start)
-        if stack and self._pays(forms):
+        if stack and (self._pays(forms) or self.lookahead.begins(self.outcome.nodes, self.covered)):
             self._forget(held)
             return list(start)
         return stack
@@ -181,6 +184,8 @@ class TreeSearch:
             if stack and self._pays(forms):
                 # from here on without the parents' relaxations, which are the energy's
                 stack = [replace(item, parent=None) if isinstance(item, TreeNode) else item for item in stack]
+            elif stack:
+                self.lookahead.begins(self.outcome.nodes, self.covered)
         self.loop(stack, None)
 
     def examined(self, items: Sequence[TreeNode], nodes: int) -> list[TreeNode]:
@@ -284,7 +289,7 @@ class TreeSearch:
         usable = relaxation if relaxation is not None and not relaxation.pruned else None
         if self.closed(item, usable):
             return []
-        node, forced = branching_node(codes, item.forced, usable, self.closer.sliding)
+        node, forced = branching_node(codes, item.forced, usable, self.closer.sliding, self.lookahead.choose)
         if node < 0:
             node = self._settle(item)
         if node < 0:
@@ -372,8 +377,10 @@ class TreeSearch:
         """True if a load at the limit leaves no hope of a complete search."""
         if self.at_limit is None:
             return False
-        endless = self.limits.max_nodes is None and self.limits.deadline is None
-        return bool(self.outcome.undecided) or (endless and self.outcome.nodes >= _AT_LIMIT)
+        # in 3D no family is known, and nodes cost more
+        most = _AT_LIMIT if self.at_limit.codes is not None else _AT_LIMIT // 8
+        many = self.limits.max_nodes is None and self.outcome.nodes >= most
+        return bool(self.outcome.undecided) or many
 
     def report(self, share: float = 0.0) -> None:
         """Tell that so much more of the tree is done, and how many nodes were examined."""

@@ -99,6 +99,14 @@ def test_points_and_graphs_in_the_plane(name):
     assert tried > 10
 
 
+def test_a_graph_with_huge_multipliers():
+    """Of a body with five rigid modes; multipliers of equilibrium that exclude a leaf are some 1e26."""
+    problem = random_body(73)
+    graph = enumsol.branch_graph(problem, (0, 0.5))
+    assert graph.complete
+    assert check_records(problem, records_of(graph.proof)) == accepted(problem, records_of(graph.proof)).selections
+
+
 def said(problem, records):
     return judge_history(problem, read_records(bytes_of(proof_of(records))))
 

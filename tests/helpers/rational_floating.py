@@ -4,7 +4,7 @@ Nothing of enumsol is imported. Points are (lambda, -q). Numbers in brackets are
 """
 
 from fractions import Fraction
-from itertools import combinations
+from itertools import chain, combinations
 from math import inf, log2, nextafter
 
 import numpy as np
@@ -187,12 +187,13 @@ class FloatingForms(Forms):
 
     def beside(self, other, terms):
         """[7.2] Whether the multipliers exclude a leaf for all alpha between this one and another."""
-        little = fmpq(1, 2**40)
-        z = [form.best(terms) or form.best(terms, little) for form in (self, other)]
-        # multipliers far along z may help at one end and do harm at the other: others that are nearer
-        near = [form.best(terms, fmpq(1, 2**12)) for form in (self, other)]
-        middle = [[(x + y) / 2 for x, y in zip(*two, strict=True)] for two in (z, near)]
-        if any(min(form.margin(terms, one) for form in (self, other)) > 0 for one in (*middle, *z, *near)):
+        little, ends = fmpq(1, 2**40), (self, other)
+        z = [form.best(terms) or form.best(terms, little) for form in ends]
+        # multipliers far along z may help at one end and do harm at the other: others that are nearer, or farther
+        beside = [[form.best(terms, fmpq(1, 2**k)) for form in ends] for k in (12, 60)]
+        pairs = [z, *beside]
+        tried = [[(x + y) / 2 for x, y in zip(*pair, strict=True)] for pair in pairs] + list(chain(*pairs))
+        if any(min(form.margin(terms, one) for form in ends) > 0 for one in tried):
             return True
         turned = [form._balanced(terms) for form in (self, other)]
         if [] in turned:

@@ -1,0 +1,95 @@
+"""Searches that look ahead near the root of the tree: the roots of the other rule, proofs that hold, the same tree."""
+
+from concurrent.futures import ThreadPoolExecutor
+
+import numpy as np
+import pytest
+from compare import assert_as_exhaustive, differences
+from complete import proven_roots
+from generators import named, random_problem
+from proof_tools import bytes_of
+
+from enumsol import enumerate_roots
+from enumsol.search import form_policy, lookahead, parallel
+
+LOOKING = lookahead.Lookahead._best
+
+
+@pytest.fixture
+def soon(monkeypatch):
+    """Searches look ahead down to six decisions once they have a hundred nodes; tells how often they did."""
+    chosen = []
+
+    def counted(self, codes, relaxation):
+        chosen.append(LOOKING(self, codes, relaxation))
+        return chosen[-1]
+
+    monkeypatch.setattr(form_policy, "NODES", 100)
+    monkeypatch.setattr(lookahead, "NODES", 100)
+    monkeypatch.setattr(lookahead, "_DEPTHS", ((1.0, 6),))
+    monkeypatch.setattr(lookahead.Lookahead, "_best", counted)
+    return chosen
+
+
+def test_random_problems_have_the_roots_of_all_selections(soon, monkeypatch):
+    monkeypatch.setattr(form_policy, "NODES", 0)
+    monkeypatch.setattr(lookahead, "NODES", 0)
+    rng, several, looked = np.random.default_rng(5), 0, 0
+    for _ in range(40):
+        problem = random_problem(rng, int(rng.integers(3, 6)))
+        found = proven_roots(problem, 0.0)
+        assert_as_exhaustive(problem, 0.0, found)
+        several += len(found) > 1
+        looked += bool(soon)
+        soon.clear()
+    assert several > 5
+    assert looked > 5
+
+
+@pytest.mark.parametrize("name", ["wedge-8-5", "wedge-14-5"])
+def test_the_roots_are_those_of_the_other_rule(name, soon, monkeypatch):
+    problem, alpha = named(name)
+    ahead = proven_roots(problem, alpha)
+    assert soon
+    monkeypatch.setattr(lookahead, "NODES", 10**9)
+    plain = proven_roots(problem, alpha)
+    assert not differences(ahead, plain, rtol=1e-9)
+    assert ahead.stats.nodes != plain.stats.nodes
+
+
+def test_the_tree_is_the_same_with_workers(soon, monkeypatch):
+    problem, alpha = named("wedge-14-5")
+    monkeypatch.setattr(parallel, "NODES", 16)
+    monkeypatch.setattr(parallel, "FIRST", 8)
+    found = []
+    for workers in (1, 2):
+        with ThreadPoolExecutor(workers) as executor:
+            found.append(proven_roots(problem, alpha, executor=executor))
+        assert soon
+        soon.clear()
+    assert bytes_of(found[0].proof) == bytes_of(found[1].proof)
+    assert not differences(found[0], enumerate_roots(problem, alpha), rtol=1e-9)
+
+
+@pytest.mark.parametrize("share", [0.3, 0.8])
+def test_a_resumed_search_learns_the_rule_from_its_file(share, soon, tmp_path):
+    (problem, alpha), path = named("wedge-14-5"), tmp_path / "x.proof"
+    whole = enumerate_roots(problem, alpha, proof_path=path)
+    data = path.read_bytes()
+    path.write_bytes(data[: int(share * len(data))])
+    soon.clear()
+    found = proven_roots(problem, alpha, proof_path=path, resume=True)
+    assert soon
+    assert not differences(found, whole, rtol=1e-9)
+    # all but the nodes after which the search began again
+    assert found.stats.resumed > 100
+    assert found.stats.resumed + found.stats.nodes == whole.stats.nodes - 100
+
+
+def test_a_resumed_search_that_did_not_look_ahead_does_not(soon, monkeypatch, tmp_path):
+    (problem, alpha), path = named("wedge-14-5"), tmp_path / "x.proof"
+    monkeypatch.setattr(lookahead, "NODES", 10**9)
+    whole = enumerate_roots(problem, alpha, proof_path=path)
+    path.write_bytes(path.read_bytes()[:-2000])
+    found = proven_roots(problem, alpha, proof_path=path, resume=True)
+    assert found.stats.resumed + found.stats.nodes == whole.stats.nodes
