@@ -17,7 +17,7 @@ import enumsol
 from enumsol.search.parts import Spread
 
 #: Seconds that a task costs more in its worker, and in the calling process: of a pool of processes, and of Dask.
-COSTS = {"pool": (0.0005, 0.0005), "dask": (0.004, 0.0035)}
+COSTS = {"pool": (0.0005, 0.0015), "dask": (0.004, 0.005)}
 WORKERS = 2, 8, 32, 100
 
 
