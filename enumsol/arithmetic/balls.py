@@ -251,7 +251,8 @@ class Ball(Pair):
     def _matrix_multiplied(self, other: Ball) -> Ball:
         k = gamma(self.mid.shape[-1] + 4)
         left, right = np.abs(self.mid), np.abs(other.mid)
-        rad = self.rad @ (right + other.rad) + left @ other.rad + k * (left @ right)
+        spread = _of_radii(self.rad, right + other.rad) + _of_radii(left, other.rad)
+        rad = spread + k * (left @ right)
         return Ball(self.mid @ other.mid, rad * (1.0 + k) * SAFE + TINY)
 
     def _added(self, other: Ball) -> Ball:
@@ -312,6 +313,12 @@ class Ball(Pair):
     def copy(self) -> Ball:
         """Another one that may be changed."""
         return Ball(self.mid.copy(), self.rad.copy())
+
+
+def _of_radii(one: Array, other: Array) -> Any:
+    """A product, which is not formed where one factor is zero and the other bounded: many matrices are exact."""
+    idle = any(not np.any(a) and np.all(np.isfinite(b)) for a, b in ((one, other), (other, one)))
+    return 0.0 if idle else one @ other
 
 
 def smaller(one: Ball, other: Ball) -> Ball:

@@ -130,6 +130,10 @@ def surface(reading: Reading, given: Card) -> str:
             f"is of type {kind}, which is not read; expected ELEMENT or NODE, or SEGMENTS or CYLINDER of straight lines"
         )
     members = reading.region.members("SURFACE", given.options["NAME"], given.place)
+    if members.parts and members.nodal != (kind == "NODE"):
+        raise given.refused(
+            f"gives {members.spelled} as nodes and as faces, also in {members.place}; expected two names"
+        )
     members.nodal = kind == "NODE"
     numbers: dict[str, tuple[int, list[int]]] = {}
     for row, entries in given.rows():

@@ -26,6 +26,8 @@ if TYPE_CHECKING:
 
 #: Of the subtrees that a task gives back, so many become tasks of their own: those nearest to the root of the tree.
 ALONE = 4
+#: Tasks that follow on others examine twice as many nodes as these, up to so many times.
+DOUBLED = 3
 
 
 @dataclass(frozen=True)
@@ -240,13 +242,17 @@ class Spread(ABC):
         for part in parts:
             if part.answer is None and not part.here:
                 heapq.heappush(self._waiting, part)
-        while self._waiting and self._crew.room > 0:
+        # one task for each worker carries what they need, which may be much; then one is as good as any other
+        spare = 0 if self._known else 3 * self._crew.workers
+        while self._waiting and self._crew.room > spare:
             self._send(heapq.heappop(self._waiting), whole=not self._known)
 
     def _send(self, part: TreePart, *, whole: bool) -> None:
         """Hand out a part; ``whole``: with all that a worker needs, which may be much."""
         data, seconds = self._data if whole else None, self._remaining()
-        self._out[self._crew.submit(_examined, self._key, data, part.roots, self._nodes, seconds)] = part
+        # in a cluster each costs as much to hand out as a few dozen nodes: once there are enough they are longer
+        nodes = self._nodes if self._crew.near else self._nodes << min(len(part.place) - 1, DOUBLED)
+        self._out[self._crew.submit(_examined, self._key, data, part.roots, nodes, seconds)] = part
 
     def _answered(self, part: TreePart) -> bool:
         """Wait for the answer of a part; False when the time is over."""

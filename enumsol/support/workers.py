@@ -34,6 +34,8 @@ if TYPE_CHECKING:
 Key = TypeVar("Key")
 #: Characters of an executor's own message that are passed on.
 _LONGEST = 160
+#: Workers of an executor that does not tell their number; seconds after which a cluster is asked again.
+_UNKNOWN, _ASKED_AFTER = 16, 10.0
 #: A task of a pool tells what it is at once it has taken so long, and no more often than this [seconds].
 _QUIET, _PAUSE = 2.0, 1.0
 #: Seconds that a broken pool has to end the tasks that it was handed; it forgets one that comes while it breaks.
@@ -67,6 +69,8 @@ class Crew:
     def __init__(self, executor: Executor) -> None:
         self._executor: Executor | None = executor
         self.redone = 0
+        #: Workers, and when a cluster was last asked for their number.
+        self._count, self._asked = _UNKNOWN, -_ASKED_AFTER
         self._renewals = 0
         self._told = False
         #: Futures, each with the number of renewals before it was handed out; the last pool that is known to be broken.
@@ -78,9 +82,24 @@ class Crew:
     @property
     def room(self) -> int:
         """Number of further tasks that should be handed out: enough to keep all workers busy."""
+        return 4 * self.workers - len(self._out) - len(self._here)
+
+    @property
+    def workers(self) -> int:
+        """Number of workers, as far as the executor tells; a cluster is asked now and then, since they come and go."""
         workers = getattr(self._executor, "_max_workers", None)
-        most = 4 * workers if isinstance(workers, int) else 64
-        return most - len(self._out) - len(self._here)
+        if isinstance(workers, int):
+            return workers
+        # the client of a cluster of Dask, or an executor that it made
+        threads = getattr(getattr(self._executor, "_client", self._executor), "nthreads", None)
+        if callable(threads) and (now := time.monotonic()) >= self._asked + _ASKED_AFTER:
+            self._count, self._asked = max(sum(threads().values()), 1), now
+        return self._count
+
+    @property
+    def near(self) -> bool:
+        """True for a pool of this machine, to which handing out a task costs little."""
+        return isinstance(getattr(self._executor, "_max_workers", None), int)
 
     def submit(self, function: Callable[..., Any], *arguments: Any) -> Job:
         """Hand out a task."""

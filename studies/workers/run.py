@@ -11,6 +11,9 @@ Nothing else may run on the machine, and threads of linear algebra must be off (
 ``--size 64 --repeat 1`` is a search of a minute and a half with one worker. ``calling`` is the part of ``cpu`` that the
 calling process takes, which puts the proof together: what it takes on a machine that has no more processors than there
 are workers these have to do without.
+
+``sharing`` says what more workers would take, from the tasks of the same search and what one costs in a pool and on a
+cluster of Dask (``sharing.py``): nothing of it is measured but the tasks, one after the other in one process.
 """
 
 from __future__ import annotations
@@ -27,6 +30,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 import enumsol
+from workers.sharing import rows_of as shared_rows
 
 if TYPE_CHECKING:
     from shared.results import Run
@@ -117,4 +121,15 @@ def main(run: Run) -> None:
         f"load of the machine before, which should be near 0: {load:.1f}",
         f"all complete and checked: {'yes' if right else 'no'}; one proof whatever the number of workers: "
         f"{'yes' if len(proofs) == len(sizes) else 'no'}",
+    )
+    shared = [row for size in sizes for row in shared_rows(enumsol.gallery.wedge(4, size // 2, pull=(4e-4, 1e-3)), 2.2)]
+    most = [row for row in shared if row["workers"] == max(entry["workers"] for entry in shared)]
+    run.table(
+        "sharing",
+        shared,
+        *(
+            f"p = {row['p']}, {row['executor']}: {row['workers']} workers would take {row['seconds']:.2f} s, "
+            f"{row['efficiency']:.2f} of them busy"
+            for row in most
+        ),
     )

@@ -154,6 +154,8 @@ WRONG = {
     "large displacements, and how to do without": (deck(steps=step(DOWN, ", NLGEOM=YES")), r"line \d+: \*STEP has NLGEOM.*--ignore NLGEOM \(in Python"),
     "a frequency analysis": (deck(steps=PRESSED + "*STEP\n*FREQUENCY\n5\n*END STEP\n"), r"line \d+: \*FREQUENCY is another analysis than \*STATIC.*--ignore FREQUENCY"),
     "a surface of nodes that are no facets": (deck(mesh=MESH + "*SURFACE, NAME=POINTS, TYPE=NODE\n11\n13\n", contact=CONTACT.replace("UNDER", "POINTS")), r"line \d+: \*SURFACE POINTS has node 11, which belongs to no facet"),
+    "a surface of nodes and of faces": (deck(mesh=MESH + "*SURFACE, NAME=UNDER, TYPE=NODE\n11\n"), r"line \d+: \*SURFACE gives UNDER as nodes and as faces, also in model.inp line \d+"),
+    "a surface of faces and of nodes": (deck(mesh=MESH + "*SURFACE, NAME=P, TYPE=NODE\n11\n*SURFACE, NAME=P\n11, S1\n"), r"line \d+: \*SURFACE gives P as nodes and as faces"),
     "a surface of nodes of no body": (deck(mesh=MESH + "*NODE\n99, 9., 9.\n*SURFACE, NAME=POINTS, TYPE=NODE\n99\n", contact=CONTACT.replace("UNDER", "POINTS")), r"line \d+: \*SURFACE POINTS has no node of a body"),
     "elements that are taken out": (deck(steps=step("*MODEL CHANGE, TYPE=ELEMENT, REMOVE\n11\n")), r"line \d+: \*MODEL CHANGE changes other things"),
     "a pair that is none is taken out": (deck(steps=step("*MODEL CHANGE, TYPE=CONTACT PAIR, REMOVE\nON, UNDER\n")), r"line \d+: \*MODEL CHANGE names the pair ON:UNDER; .* UNDER:ON"),

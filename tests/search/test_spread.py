@@ -11,7 +11,7 @@ from interruptions import CtrlC, interrupted
 from proof_tools import by_forms, bytes_of, records_of
 
 from enumsol import enumerate_roots, gallery, verify
-from enumsol.search import form_policy as policy, parallel
+from enumsol.search import form_policy as policy, parallel, parts
 from enumsol.support.workers import Crew
 
 
@@ -40,13 +40,15 @@ class Watched(ThreadPoolExecutor):
         return future
 
 
-def test_no_part_is_long_and_no_worker_waits(small_parts, monkeypatch, wedge):
+@pytest.mark.parametrize("near", [True, False])
+def test_no_part_is_long_and_no_worker_waits(small_parts, monkeypatch, wedge, near):
     problem, alpha, whole = wedge
+    monkeypatch.setattr(Crew, "near", near)
     seen, before = [], Crew.next
 
     def watched(self, seconds=None):
         # when the search waits either the workers have enough to do, or there is no more
-        seen.append((self.room, len(spread._waiting)))
+        seen.append((self.room - (0 if spread._known else 3 * self.workers), len(spread._waiting)))
         return before(self, seconds)
 
     def made(*arguments):
@@ -61,7 +63,8 @@ def test_no_part_is_long_and_no_worker_waits(small_parts, monkeypatch, wedge):
         found = enumerate_roots(problem, alpha, executor=executor)
     assert not differences(found, whole, rtol=1e-12)
     nodes = [part.nodes for part in executor.parts if part is not None]
-    assert max(nodes) <= 16
+    # parts are longer where handing them out costs more
+    assert max(nodes) <= 16 if near else 16 < max(nodes) <= 16 << parts.DOUBLED
     assert sum(nodes) == found.stats.nodes - 8
     assert found.stats.nodes == pytest.approx(whole.stats.nodes, rel=0.05)
     assert all(room <= 0 or not waiting for room, waiting in seen)

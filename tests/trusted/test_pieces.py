@@ -216,7 +216,7 @@ def test_second_derivatives_over_a_piece_hold_differences(p, seed, loose):
             continue
         point = leaf.over(angle, 0.0 * radius, still=True)
         Y = rng.standard_normal((n, n))
-        second = leaf.second(Y, (state, point), angle, radius)
+        moved, swept = leaf.second(Y, (state, point), angle, radius)
         half = (piece.high - piece.low) / 2
 
         def at(z, codes=codes, half=half, Y=Y, angle=angle):
@@ -226,11 +226,13 @@ def test_second_derivatives_over_a_piece_hold_differences(p, seed, loose):
         steps = np.diag(np.append(0.4 * radius, 0.4))
         z = np.append(rng.uniform(-0.2, 0.2, n) * radius, rng.uniform(-0.2, 0.2))
         for j, one in enumerate(steps):
+            means, lost = np.zeros((n, n + 1)), np.zeros(n + 1)
             for k, other in enumerate(steps):
                 difference = at(z + one + other) - at(z + one) - at(z + other) + at(z)
-                mean = difference / (one[j] * other[k])
-                lost = 1e-13 * np.max(np.abs(at(z))) / (one[j] * other[k])
-                assert np.all(np.abs(second.mid[:, j, k] - mean) <= second.rad[:, j, k] + lost)
+                means[:, k] = np.abs(difference / (one[j] * other[k]))
+                lost[k] = 1e-13 * np.max(np.abs(at(z))) / (one[j] * other[k])
+            assert np.all(means[:, :n] @ radius <= moved[:, j] + lost[:n] @ radius)
+            assert np.all(means[:, n] <= swept[:, j] + lost[n])
 
 
 @pytest.mark.parametrize("seed", range(4))
@@ -447,8 +449,8 @@ def test_what_changes_along_a_piece_lies_in_its_balls(p, loose, share):
             continue
         known += 1
         Y = np.linalg.inv(point.J.mid) if seed % 2 else rng.normal(size=(p + loose, p + loose))
-        second = leaf.second(Y, (state, point), angle, radius)
-        slope = slopes_by_second(Ball.exact(Y), point.whole_J, state.whole_J, second, np.append(radius, 1.0))
+        beside = sum(leaf.second(Y, (state, point), angle, radius))
+        slope = slopes_by_second(Ball.exact(Y), point.whole_J, state.whole_J, beside)
         held = Ball.beside(state.box.slope, state.box.lone)
         for _ in range(20):
             z = np.append(radius, 1.0) * rng.choice([-1, 1, rng.uniform(-1, 1)], p + loose + 1)

@@ -128,9 +128,8 @@ def _changes_along_piece(last: LastBox) -> bool:
         Y = np.asarray(np.linalg.inv(point.J.mid), dtype=np.float64)
     except np.linalg.LinAlgError:
         return False
-    second = leaf.second(Y, (state, point), angle, radius).size
-    bends, mixed = second[:, :-1, :-1] @ radius, second[:, :-1, -1]
-    turned, swept = (np.max(part @ radius / radius) for part in (bends, mixed))
+    over = leaf.second(Y, (state, point), angle, radius)
+    turned, swept = (np.max(part[:, :-1] @ radius / radius) for part in over)
     return bool(swept > turned)
 
 

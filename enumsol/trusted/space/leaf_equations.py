@@ -13,7 +13,7 @@ from scipy.linalg import qr
 from enumsol.arithmetic.balls import SAFE, TINY, UNIT, Ball, smaller, solution, upper_norm, upper_sum
 from enumsol.model.sectors import SECTORS, direction, end_number
 from enumsol.trusted.space.sector_rows import OPEN, SLIP_MINUS, SLIP_PLUS, STICK
-from enumsol.trusted.space.turning import LIBRARY, AngleBox, Combined, Turning, turned_by
+from enumsol.trusted.space.turning import LIBRARY, AngleBox, Combined, Turning, sums_of_both, turned_by
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -211,42 +211,46 @@ class Leaf:
         w[self.loose] = 0.0
         return State(box.y, w, G, J[:, :-1], box, J[:, -1]) if self.piece else State(box.y, w, G, J, box)
 
-    def bends(self, Y: Floats, over: tuple[State, State], angle: Floats, radius: Floats) -> tuple[Combined, Ball]:
-        """Rows of w that Y G has for directions that are held, and Y times second derivatives of G by the angles.
+    def bends(self, Y: Floats, over: tuple[State, State], angle: Floats, radius: Floats) -> tuple[Combined, Floats]:
+        """Rows of w that Y G has for directions that are held, and how much Y dG/dpsi differs over the box, (n, q).
 
+        The latter bounds sums over k of the sizes of Y times the second derivatives by angles j and k times ``radius``.
         ``over``: the states over the box and in its middle.
         """
-        (state, point), (d, turned), own = over, self.directions(angle, radius), np.arange(len(self.turning))
+        (state, point), (d, turned), q = over, self.directions(angle, radius), len(self.turning)
         # v_i1 d_i2 - v_i2 d_i1
         rows = Ball(np.zeros((len(Y), len(state.box.w.mid))), np.zeros((len(Y), len(state.box.w.mid))))
-        scale = Ball.exact(Y[:, : len(own)]), Ball.exact(self.slip_scale)
-        rows[:, self.free] = Ball.exact(Y[:, len(own) :])
+        scale = Ball.exact(Y[:, :q]), Ball.exact(self.slip_scale)
+        rows[:, self.free] = Ball.exact(Y[:, q:])
         for k, part in enumerate((d[:, 1], -d[:, 0])):
             rows[:, self.t[:, k]] = scale[0] * (scale[1][:, k] * part)
-        w = state.box.combined(rows, point.box, radius[: len(own)])
-        bends = w.bends()
+        w = state.box.combined(rows, point.box, radius[:q])
+        beside, own = w.bends(radius[:q])
         # psi_i turns d_i itself, in both orders, and d_i'' = -d_i
         (dv1, dv2), (v1, v2) = (self.slips(part) for part in (state.box.dw, state.box.w))
-        turn = scale[0][:, :, None] * (dv1 * turned[:, 1][:, None] - dv2 * turned[:, 0][:, None])
-        bent = scale[0] * (v2 * d[:, 0] - v1 * d[:, 1])
-        bends = bends + turn + Ball(turn.mid.transpose(0, 2, 1), turn.rad.transpose(0, 2, 1))
-        bends[:, own, own] = bends[:, own, own] + bent
-        return w, bends
+        turn = dv1 * turned[:, 1][:, None] - dv2 * turned[:, 0][:, None]
+        twice = Ball(np.diagonal(turn.mid), np.diagonal(turn.rad))
+        own = own + scale[0] * (twice + twice + (v2 * d[:, 0] - v1 * d[:, 1]))
+        beside = beside + sums_of_both(np.abs(scale[0].mid), turn.size, radius[:q])
+        return w, np.asarray((beside + own.size * radius[:q]) * SAFE + TINY)
 
-    def second(self, Y: Floats, over: tuple[State, State], angle: Floats, radius: Floats) -> Ball:
-        """Y times second derivatives over a box and a piece by all n unknowns and s, (n, n + 1, n + 1)."""
+    def second(self, Y: Floats, over: tuple[State, State], angle: Floats, radius: Floats) -> tuple[Floats, Floats]:
+        """How much Y times the derivatives by all n unknowns and s differ over a box and over a piece, (n, n + 1) each.
+
+        The first bounds sums over the unknowns k of the sizes of Y times the second derivatives times ``radius``, the
+        second is the size of those by s.
+        """
         (w, bends), n, q = self.bends(Y, over, angle, radius), len(angle), len(self.turning)
         (s1, s2), (_, turned) = self.slips(over[0].box.ds), self.directions(angle, radius)
         turn = Ball.exact(Y[:, :q])[:, :, None] * (s1 * turned[:, 1][:, None] - s2 * turned[:, 0][:, None])
-        second = Ball(np.zeros((n, n + 1, n + 1)), np.zeros((n, n + 1, n + 1)))
-        (by_angle, swept), mixed = w.loosened(), w.mixed() + turn[:, :, -1]
-        second[:, :q, :q], second[:, n, n] = bends, w.twice()
-        second[:, :q, q:n] = by_angle + turn[:, :, :-1]
-        second[:, :q, n], second[:, q:n, n] = mixed, swept
-        # the same on the other side of the diagonal
-        for part in (second.mid, second.rad):
-            part[:, q:, :q], part[:, n, q:n] = part[:, :q, q:].transpose(0, 2, 1), part[:, q:n, n]
-        return second
+        by_angle, swept = w.loosened()
+        loose, mixed = (by_angle + turn[:, :, :-1]).size, (w.mixed() + turn[:, :, -1]).size
+        along = np.column_stack([mixed, swept.size, w.twice().size])
+        over_box = np.zeros((n, n + 1))
+        over_box[:, :q] = (bends + upper_sum(loose * radius[q:], axis=2)) * SAFE
+        over_box[:, q:n] = upper_sum(loose * radius[:q, None], axis=1)
+        over_box[:, n] = upper_sum(along[:, :n] * radius, axis=1)
+        return over_box, along
 
 
 def _sector_boxes(numbers: Sequence[int]) -> tuple[Floats, Floats]:
@@ -272,10 +276,9 @@ def turned(one: Floats, other: Floats) -> Floats:
     return np.asarray(np.arctan2(one[:, 0] * other[:, 1] - one[:, 1] * other[:, 0], np.sum(one * other, axis=1)))
 
 
-def slopes_by_second(inverse: Ball, point: Ball, box: Ball, second: Ball, reach: Floats) -> Ball:
-    """Y dG over a box, by dG there, or by that in its middle and Y times the second derivatives over the box."""
+def slopes_by_second(inverse: Ball, point: Ball, box: Ball, beside: Floats) -> Ball:
+    """Y dG over a box, by dG there, or by that in its middle and how much Y dG differs ``beside`` it."""
     middle = inverse @ point
-    beside = upper_sum(second.size * reach, axis=2)
     return smaller(Ball(middle.mid, (middle.rad + beside) * SAFE), inverse @ box)
 
 
@@ -289,8 +292,8 @@ def around_middle(
     (angle, radius), (state, point), q = box, over, len(box[0])
     if not q:
         return Ball.exact(np.zeros((0, 0))), Ball.exact(np.zeros(0)), Ball.exact(np.zeros(0))
-    inverse, second = Ball.exact(Y), leaf.second(Y, over, angle, radius)
-    slope = slopes_by_second(inverse, point.whole_J, state.whole_J, second, np.r_[radius, 1.0])
+    inverse, (turned, swept) = Ball.exact(Y), leaf.second(Y, over, angle, radius)
+    slope = slopes_by_second(inverse, point.whole_J, state.whole_J, (turned + swept) * SAFE)
     others = np.delete(np.arange(q + 1), k)
     return Ball.exact(np.eye(q)) - slope[:, others], -slope[:, k], -(inverse @ point.G)
 

@@ -214,8 +214,8 @@ def krawczyk(leaf: Leaf, angle: Floats, radius: Floats, state: State, *, rough: 
         return Ball(move.mid, (move.rad + along.size) * SAFE)
     slope = inverse @ state.J
     if not leaf.free:
-        bends = leaf.bends(Y, (state, point), angle, radius)[1]
-        slope = slopes_by_second(inverse, point.J, state.J, bends, radius)
+        beside = leaf.bends(Y, (state, point), angle, radius)[1]
+        slope = slopes_by_second(inverse, point.J, state.J, beside)
     return (Ball.exact(np.eye(q)) - slope) @ span - inverse @ point.G
 
 

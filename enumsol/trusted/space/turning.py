@@ -126,16 +126,15 @@ class Combined(NamedTuple):
     across: Ball
     along: Ball
 
-    def bends(self) -> Ball:
-        """Second derivatives with respect to the angles, (k, q, q)."""
+    def bends(self, radius: Floats) -> tuple[Floats, Ball]:
+        """Second derivatives with respect to the angles j and k: bounds of sums over k, and those with j = k, (k, q).
+
+        Added up is over all other angles, the sizes of the derivatives times ``radius``: the tensor of all is not made.
+        """
         across, (x, z) = self.across, (self.box.x, self.box.z)
         # d^2 w / dpsi_j dpsi_k = -(across_k z_kj x_j + across_j z_jk x_k), and -along_j x_j more where j = k
-        moved = z * x
-        half = across[:, None, :] * moved.T
-        bends = half + Ball(half.mid.transpose(0, 2, 1), half.rad.transpose(0, 2, 1))
-        diagonal = np.arange(len(x.mid))
-        bends[:, diagonal, diagonal] = bends[:, diagonal, diagonal] + self.along * x
-        return -bends
+        moved, twice = z * x, across * Ball(np.diagonal(z.mid), np.diagonal(z.rad))
+        return sums_of_both(across.size, moved.size, radius), -((twice + twice + self.along) * x)
 
     def mixed(self) -> Ball:
         """Over a piece of alpha, second derivatives with respect to the angles and to s, (k, q).
@@ -390,6 +389,13 @@ def held_by(matrix: Ball, SE: Ball, load: Ball, rows: Sequence[int]) -> tuple[Ba
     w = left - (Q @ left[rows] + (SE - Q @ matrix) @ rest)
     w.mid[rows], w.rad[rows] = 0.0, 0.0
     return near + rest, w
+
+
+def sums_of_both(left: Floats, right: Floats, radius: Floats) -> Floats:
+    """Bounds of the sums over all k but j of (left_ik right_kj + left_ij right_jk) radius_k, of nonnegative floats."""
+    others = right * (1.0 - np.eye(len(right)))
+    sums = (left * radius) @ others + left * (others @ radius)
+    return np.asarray(sums * (1.0 + gamma(2 * len(right) + 8)) * SAFE + TINY)
 
 
 def grown_share(share: Ball) -> Ball:
