@@ -62,7 +62,7 @@ def scene_steps(scene: Scene, steps: Iterable[Mapping[str, Any]]) -> list[LoadSt
     ... )
     >>> steps = fem.scene_steps(scene, [{"pressure": {"top": 1}}, {"pressure": {"top": 1}, "force": {"right": (1, 0)}}])
     >>> enumsol.histories(scene.problem(), steps).counts
-    [1, 1]
+    (1, 1)
     """
     tables = list(steps)
     for number, table in enumerate(tables, 1):
