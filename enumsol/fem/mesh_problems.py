@@ -369,7 +369,7 @@ def read_mesh_problem(path: str | os.PathLike[str]) -> AnyProblem:
     In the file, ``pairs`` may also be called ``contact_pair``.
 
     The file may also have a ``title`` and ``units`` of forces and lengths such as "N,mm", for what commands print,
-    and the ``steps`` of a history, which the command ``enumsol history`` reads.
+    and the ``steps`` of a history, which the command ``enumsol history`` reads, see `scene_steps`.
 
     Parameters
     ----------

@@ -40,8 +40,9 @@ if TYPE_CHECKING:
 _REPORT_EVERY = 64
 #: Number of contact nodes from which a root is sought before the tree: of fewer the tree finds one sooner.
 _MANY = 24
-#: Nodes at the limit of what contact can hold, if nothing else is to end the search: blocks in 3D with 4 contact nodes
-#: take some 1,000 and in 2D with 21 some 1,600; others had not come to an end after 8,000 and 18,000.
+#: Nodes at the limit of what contact can hold, if no other number of them is given: blocks in 2D with 21 contact
+#: nodes take some 1,600, and in 3D with 4 some 1,000; others had not come to an end after 18,000 and 8,000. In 3D an
+#: eighth of it, some seconds.
 _AT_LIMIT = 2000
 
 
@@ -376,8 +377,10 @@ class TreeSearch:
         """True if a load at the limit leaves no hope of a complete search."""
         if self.at_limit is None:
             return False
-        endless = self.limits.max_nodes is None and self.limits.deadline is None
-        return bool(self.outcome.undecided) or (endless and self.outcome.nodes >= _AT_LIMIT)
+        # in 3D no family is known, and nodes cost more
+        most = _AT_LIMIT if self.at_limit.codes is not None else _AT_LIMIT // 8
+        many = self.limits.max_nodes is None and self.outcome.nodes >= most
+        return bool(self.outcome.undecided) or many
 
     def report(self, share: float = 0.0) -> None:
         """Tell that so much more of the tree is done, and how many nodes were examined."""

@@ -45,6 +45,22 @@ was tried on six clips (p = 17 to 25, friction 2 to 5), geometric means of nodes
   1.25; eps of 3e-3 and 1e-2 1.0.
 - the children of all candidates solved: 0.55 to 0.73 as many nodes, three to six times as many programs.
 
+Table ``lookahead``: verified searches that look ahead near their root once their tree has proven long
+(``enumsol/search/lookahead.py``), and the same that never do. Read the nodes, which include the first thousand. What
+else was tried, nodes + programs of children (each costs about 0.4 nodes), without the first thousand nodes:
+
+- from the beginning: wedge 20 straight 1,098 -> 1,158 + 1,785, wedge 14 straight 578 -> 552 + 814, dovetail 143 -> 154
+  + 303: short trees pay more for the programs than they gain.
+- every tree after a thousand nodes: wedge 32 straight 4,378 -> 3,912 + 4,387; half of its tree is done by then.
+- deeper: clip 8 x 1, F = 3 with 6, 8 and 12 decisions 6,656 + 2,049, 7,929 + 5,349, 16,521 + 32,459 (8,165 without);
+  taper p = 48 11,626 + 3,989, 10,070 + 9,173, 7,349 + 30,054 (23,908), wedge 48 straight 15,422 + 5,089, 18,311 +
+  9,417, 21,824 + 26,169 (30,401).
+- the geometric mean of the shares in place of (5.7), 12 decisions: taper p = 48 7,688 + 29,958, clip 8 x 1, F = 3 6,506
+  + 14,608, but wedge 48 straight 69,819 + 116,218.
+- times the violation: wedge 32 oblique, 8 decisions, 15,371 in place of 9,279 (14,581 without).
+- fewer candidates: of the 24 with the largest violation brake shoe p = 33 5,017 in place of 3,162; the twelve with the
+  best first dual steps, 8 decisions, taper p = 48 12,231 + 5,524.
+
 New forms for subtrees do not pay on clip 8 x 1, F = 3. The best form (by a semidefinite program, 0.1 to 0.3 s) excludes
 4 of 10 subtrees with 11 undecided nodes, all of fewer than 160 nodes, which take 3 ms; of the gap of the others it
 leaves a quarter to nine tenths. With products of rows of two nodes, all pairs, it excludes 6 of 8 subtrees with 8
@@ -54,17 +70,21 @@ the tree is 1.05 to 1.3 times as large: minima over assignments below the root a
 
 from __future__ import annotations
 
+import time
 from functools import partial
 from typing import TYPE_CHECKING
+from unittest import mock
 
 import numpy as np
 
+import enumsol
 from branching_rule.notes import conclusions, draw, slow_conclusions
 from branching_rule.rules import RULES
 from enumsol import gallery
 from enumsol.model.statuses import UNDECIDED
 from enumsol.relaxation.active_set import ActiveSetEngine
 from enumsol.relaxation.imposed_rows import status_rows
+from enumsol.search import lookahead
 from shared.clock import least_time
 from shared.loads import DRAGGED, PRESSED, Loaded, block, oblique_wedge, straight_wedge
 from shared.searches import search
@@ -181,6 +201,43 @@ def share_at_root(problem, alpha):
     return float(np.round(root.gap_closed((UNDECIDED,) * system.p), 4))
 
 
+def lookahead_problems(smoke):
+    """Trees of more than a thousand nodes, the clip's also in the smoke size."""
+    yield Loaded("clip 8 x 1", 17, partial(gallery.clip, 8, 1), 2.0)
+    if smoke:
+        return
+    yield Loaded("clip 8 x 1", 17, partial(gallery.clip, 8, 1), 3.0)
+    for nx in (12, 16):
+        yield Loaded(f"brake shoe {nx} x 3", 2 * nx + 1, partial(gallery.brake_shoe, nx, 3), 0.4)
+    for p in (20, 32):
+        yield oblique_wedge(p)
+        yield straight_wedge(p)
+    for ny in (16, 24, 32):
+        yield Loaded(f"taper 4 x {ny}", 2 * ny, partial(gallery.taper, 4, ny), 0.2)
+
+
+def lookahead_row(loaded):
+    """One verified search as it is, and one that never looks ahead; proofs are checked."""
+    problem = loaded.build()
+    problem.condensed, problem.enclosure  # noqa: B018 (made once, outside the clock)
+    line, found = {"problem": loaded.name, "p": loaded.p, "F": loaded.alpha}, set()
+    for name, nodes in (("without", 10**9), ("as it is", lookahead.NODES)):
+        with mock.patch.object(lookahead, "NODES", nodes):
+            start = time.process_time()
+            roots = enumsol.enumerate_roots(problem, loaded.alpha)
+            seconds = time.process_time() - start
+        assert roots.complete
+        assert enumsol.verify(problem, roots.proof).complete
+        line |= {
+            f"nodes, {name}": roots.stats.nodes,
+            f"s, {name}": seconds,
+            f"proof, {name} [kB]": roots.proof.size // 1000,
+        }
+        found.add(len(roots))
+    (line["roots"],) = found
+    return line
+
+
 def main(run: Run) -> None:
     max_nodes = SMOKE_NODES if run.smoke else MAX_NODES
     rows = []
@@ -194,4 +251,5 @@ def main(run: Run) -> None:
     run.table("branching", rows, *conclusions(rows, max_nodes))
     slow = [slow_row(loaded, SLOW_NODES) for loaded in slow_problems(run.smoke)]
     run.table("slow", slow, *slow_conclusions(slow))
+    run.table("lookahead", [lookahead_row(loaded) for loaded in lookahead_problems(run.smoke)])
     run.figure("branching", draw(rows))

@@ -13,8 +13,7 @@ calling process takes, which puts the proof together: what it takes on a machine
 are workers these have to do without.
 
 ``sharing`` says what more workers would take, from the tasks of the same search and what one costs in a pool and on a
-cluster of Dask (``sharing.py``): nothing of it is measured but the tasks, one after the other in one process. An
-executor that a machine of two processors cannot feed is not run.
+cluster of Dask (``sharing.py``): nothing of it is measured but the tasks, one after the other in one process.
 """
 
 from __future__ import annotations

@@ -93,7 +93,7 @@ def test_a_search_without_hope_ends(workers):
 
 @pytest.mark.parametrize("space", [False, True])
 def test_a_search_that_might_not_end_does(space, monkeypatch):
-    monkeypatch.setattr("enumsol.search.tree._AT_LIMIT", 30)
+    monkeypatch.setattr("enumsol.search.tree._AT_LIMIT", 240 if space else 30)
     flat = block_on_table(cells=20, push=1.0)
     problem = enumsol.gallery.block_on_table3d(2, push=(0.6, 0.8)) if space else flat
     roots = enumsol.enumerate_roots(problem, 0)
@@ -101,7 +101,8 @@ def test_a_search_that_might_not_end_does(space, monkeypatch):
     assert "at the limit" in roots.stopped
     assert NAMED in repr(roots)
     assert len(roots.families) == (not space)
-    # a limit that is given is kept
+    # so does one that has more time; another number of nodes is kept
+    assert enumsol.enumerate_roots(problem, 0, time_limit=60).stats.nodes == roots.stats.nodes
     longer = enumsol.enumerate_roots(problem, 0, max_nodes=64)
     assert longer.stats.nodes == 64
     assert "max_nodes" in longer.stopped

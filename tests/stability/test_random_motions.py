@@ -8,7 +8,7 @@ from growing_motions import growing_in_space, growing_motions
 from linear_motions import random_motion, random_motion_in_space, setting, setting_in_space
 
 from enumsol.search.stability import StabilitySearch
-from enumsol.trusted.running_away import left_open
+from enumsol.trusted.running_away import NoMotion, left_open
 from enumsol.trusted.status_rows import OPEN, STICK
 
 
@@ -64,6 +64,26 @@ def test_degrees_of_freedom_without_mass():
 def test_two_thousand_random_motions(part):
     counts = compared([(4, part, k) for k in range(250)])
     assert counts["undecided"] <= 5, counts
+
+
+def test_no_range_without_end_hides_what_grows_where_some_nodes_have_no_mass():
+    tried = 0
+    for k in range(120):
+        data = random_motion(rng := np.random.default_rng((9, k)), massless=True)
+        if not (judged := growing_motions(*data)):
+            continue
+        stiffness, motions = setting(*data)
+        size, low = len(motions.signed), 0.5 * max(mu for mu, *_ in judged)
+        for weights in (
+            np.eye(size),
+            np.diag(rng.uniform(0.2, 2, size)),
+            np.eye(size) - 0.3 * rng.random((size, size)),
+        ):
+            for beside in (None, 0.0, 0.5 * low):
+                tried += 1
+                none = np.zeros((size, size))
+                assert not NoMotion(low, np.inf, beside, (), (), weights, (none, none)).holds(stiffness, motions), k
+    assert tried >= 30
 
 
 @pytest.mark.long

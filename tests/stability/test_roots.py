@@ -248,3 +248,9 @@ def test_mass_of_low_rank():
             if found.verdict != "undecided":
                 assert (found.verdict == "runs away") == bool(of_a_root(problem, root, mass))
     assert counts.total() >= 4
+
+
+def test_the_sliding_brake_shoe_runs_away_where_its_stiffness_is_known_but_roughly():
+    entry = gallery.get("brake-shoe-9")
+    found = enumsol.enumerate_roots(entry.build(), entry.alpha).stability()
+    assert [own.verdict for own in found] == ["does not run away", "runs away", "does not run away"]
