@@ -195,8 +195,10 @@ def mesh_problem(
         The contact boundary, in contact with a rigid foundation.
     pairs : sequence of (slave, master) or (slave, master, gap)
         Parts of two bodies that may touch each other. The nodes of the first part are the contact nodes; each is in
-        contact with the point of a facet of the second part on the line along its normal (theory, section 11.8). Nodes
-        that face no facet have no contact. The gap is the distance along the normal, or the one that is given [length].
+        contact with the point of a facet of the second part on the line along its normal (theory, section 11.8). The
+        first part may be a set of nodes (``node_sets`` of the mesh), whose normals are against those of the second at
+        its points nearest to them; then there are no ``areas``. Nodes that face no facet have no contact. The gap is
+        the distance along the normal, or the one that is given [length].
     plane : {"strain", "stress", "axisymmetric"}, or mapping of names to them, optional
         In 2D, whether strain or stress is plane, for the whole body or for every part of it; by default strain. It has
         to be given for a file whose elements are of plane stress (CPS4 and the like). Of an axisymmetric body x is the

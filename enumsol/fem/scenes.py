@@ -19,7 +19,7 @@ from enumsol.fem.contacts import Contacts, Group
 from enumsol.fem.joints import Joints, resized
 from enumsol.fem.meshes import PartedMesh, unit_vectors
 from enumsol.fem.restrained import Body, Supports, axes_of, problem_of
-from enumsol.model.cells import KINDS, boundary_facets, by_kind, facet_outlines, lines_along
+from enumsol.model.cells import KINDS, boundary_facets, by_kind, facet_outlines, facet_rows, lines_along
 from enumsol.model.mass import consistent_mass
 from enumsol.model.mesh import BodyMesh
 from enumsol.model.problem import given_friction
@@ -200,12 +200,8 @@ class Scene:
         """
         mesh, contacts, supports = self.mesh, self.contacts, self.held
         nodes = contacts.rows
-        surface = contacts.facets if any(group.pair is not None for group in contacts.groups) else None
-        more: dict[str, Any] = {}
-        if self.dimension == 3:
-            from enumsol.fem.solid_problems import outward  # not for plane bodies
-
-            surface, more = outward(contacts.facets, mesh.cells), {"areas": contacts.areas}
+        more = {"areas": contacts.areas} if self.dimension == 3 and np.all(contacts.areas > 0) else {}
+        surface = self._surface()
         gaps, coefficients = self.gaps, self.coefficients
         modes, bound = self._rigid_modes()
         mass = self._mass()
@@ -241,6 +237,21 @@ class Scene:
             **more,
         )
         return afresh(problem, notes=tuple(self.notes))
+
+    def _surface(self) -> Integers | None:
+        """Facets of the contact surface, in 3D as seen from outside, and those around nodes without facets."""
+        contacts, cells, d = self.contacts, self.mesh.cells, self.dimension
+        alone = contacts.rows.nodes[contacts.areas == 0]
+        if len(alone):
+            outer = boundary_facets(d, cells)
+            around = np.flatnonzero(np.any(np.isin(outer, alone), axis=1))
+            rows = {*facet_rows(d, contacts.facets, outer), *around.tolist()}
+            return outer[np.array(sorted(rows), dtype=np.int64)]
+        if d == 3:
+            from enumsol.fem.solid_problems import outward  # not for plane bodies
+
+            return outward(contacts.facets, cells)
+        return contacts.facets if any(group.pair is not None for group in contacts.groups) else None
 
     def _kept(self) -> dict[str, Floats | None]:
         """Material that the problem keeps of its mesh."""
