@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import TYPE_CHECKING, Any, cast
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import scipy.sparse as sp
@@ -73,6 +73,8 @@ class Scene:
         Mass per volume, in 2D per area, of the cells; None where it is uniform and not given.
     stress : (M, s) array or None
         Mean stresses of the cells with no displacement, of a change of temperature [force / length^2].
+    stress_slope : (M, s) array or None
+        Their derivatives with respect to alpha.
     stiffness : (k, k) csc_array or None
         What another code assembled in place of the body's own: by all displacements, and behind them those that only
         its elements have [force / length].
@@ -93,6 +95,7 @@ class Scene:
     pieces: list[BodyPiece]
     masses: Floats | None = None
     stress: Floats | None = None
+    stress_slope: Floats | None = None
     stiffness: sp.csc_array | None = None
     notes: list[str] = field(default_factory=list)
 
@@ -219,6 +222,7 @@ class Scene:
                 supports,
                 equations=self.joints.equations,
                 named=named,
+                warmed=self.stress_slope is not None,
             ),
             nodes,
             self.tangents,
@@ -256,6 +260,7 @@ class Scene:
             "lame": lame,
             "elasticity": self.material.elasticity if lame is None else None,
             "initial_stress": self.stress,
+            "stress_slope": self.stress_slope,
         }
 
     def _mass(self) -> sp.csc_array | None:
@@ -371,9 +376,11 @@ def _material(scene: Scene) -> list[str]:
     given = [name for name in ("density", "expansion") if getattr(scene.options, name) is not None]
     laws = [name for name in ("young", "poisson", "orthotropic", "orientation") if _given(scene, name)]
     names = (*laws, *(("plane", "thickness") if scene.dimension == 2 else ()), *given)
-    warm = scene.options.temperature
-    alone = isinstance(warm, (Mapping, int, float))
-    told = [] if warm is None else [f"temperature {_said(cast('Any', warm)) if alone else 'by nodes'}"]
+    told = []
+    for name in ("temperature", "temperature_slope"):
+        if (warm := getattr(scene.options, name)) is not None:
+            alone = isinstance(warm, (Mapping, int, float))
+            told.append(f"{name} {_said(warm) if alone else 'by nodes'}")
     return [f"{name} {_said(getattr(scene.options, name))}" for name in names] + told
 
 

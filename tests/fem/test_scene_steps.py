@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from parted_solids import solid
 
 import enumsol
 from enumsol import fem
@@ -102,6 +103,18 @@ def test_friction_by_parts_and_for_all():
     assert steps[1].friction == 0.3
     with pytest.raises(enumsol.InvalidArgumentError, match="step 1: friction is not given for right"):
         fem.scene_steps(made, [{"friction": {"bottom": 0.1}}])
+
+
+def test_friction_along_two_axes_in_3d():
+    given = {**GIVEN, "friction": [0.3, 0.2]}
+    made = fem.mesh_scene(solid((1, 1, 1), 8), **given)
+    steps = fem.scene_steps(made, [{"friction": [0.1, 0.4]}, {"friction": {"bottom": [0.5, 0.6]}}, {}])
+    problem = made.problem()
+    for step, pair in zip(steps, ([0.1, 0.4], [0.5, 0.6]), strict=False):
+        assert np.array_equal(step.friction, np.tile(pair, (problem.p, 1)))
+        assert step.load is None
+    assert problem.p == 2  # a pair is not taken as one coefficient for each node
+    assert steps[2].friction is None
 
 
 def test_the_history_ends_in_roots_of_the_last_load_alone():
