@@ -54,7 +54,7 @@ def scene_steps(scene: Scene, steps: Iterable[Mapping[str, Any]]) -> list[LoadSt
     Raises
     ------
     InvalidArgumentError
-        A step is not of that form, or lacks the alpha on which its load depends.
+        A step is not of that form, or lacks the alpha on which its load depends; or another code made the stiffness.
     InvalidProblemError
         A step changes more than loads, displacements of nodes without contact, and friction.
 
@@ -70,6 +70,8 @@ def scene_steps(scene: Scene, steps: Iterable[Mapping[str, Any]]) -> list[LoadSt
     (1, 1)
     """
     tables = list(steps)
+    if scene.stiffness is not None:
+        raise InvalidArgumentError("the stiffness of the scene is of another code; expected its steps in the deck")
     for number, table in enumerate(tables, 1):
         _check(number, table)
     first, loaded = scene.problem(), any(table.keys() & {*_LOADS} for table in tables)

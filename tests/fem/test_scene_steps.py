@@ -1,5 +1,7 @@
 """Steps of a history of a scene against load vectors that are made by hand, and against problems of one step alone."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from parted_solids import solid
@@ -147,3 +149,9 @@ def test_what_cannot_be_a_step_is_refused(steps, words):
     mesh = fem.PartedMesh(BLOCK.points, BLOCK.cells, BLOCK.facets, node_sets={"edge": edge})
     with pytest.raises((enumsol.InvalidArgumentError, enumsol.InvalidProblemError), match=words):
         fem.scene_steps(fem.mesh_scene(mesh, **GIVEN), steps)
+
+
+def test_a_stiffness_of_another_code_is_refused():
+    made = replace(scene(), stiffness=scene().problem().A)
+    with pytest.raises(enumsol.InvalidArgumentError, match="the stiffness of the scene is of another code"):
+        fem.scene_steps(made, [{}])
