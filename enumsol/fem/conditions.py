@@ -54,6 +54,7 @@ class Options:
     thickness: float | Mapping[str, float]
     expansion: float | Mapping[str, float] | None
     temperature: ArrayLike | Mapping[str, float] | None
+    temperature_slope: ArrayLike | Mapping[str, float] | None
     density: float | Mapping[str, float] | None
     friction: Coefficients
     friction_slope: Coefficients
