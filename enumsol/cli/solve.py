@@ -149,6 +149,7 @@ MESH_OPTIONS = {
     "thickness": Given(_BODY, "[NAME=]LENGTH", _number),
     "expansion": Given(_BODY, "[NAME=]NUMBER", _number),
     "temperature": Given(_LOAD, "[NAME=]NUMBER", _number),
+    "temperature_slope": Given(_LOAD, "[NAME=]NUMBER", _number),
     "density": Given(_BODY, "[NAME=]DENSITY", _number),
     "friction": Given(_BODY, "[NAME=]F", _number_or_numbers),
     "friction_slope": Given(_BODY, "[NAME=]F", _number_or_numbers),
@@ -236,6 +237,7 @@ def solve(
         deck are.
     expansion : Coefficient of thermal expansion, by parts of the body.
     temperature : Change of temperature, by parts of the body, of nodes or of the boundary.
+    temperature_slope : The same, times alpha.
     thickness : In 2D, thickness; by default all forces are per unit thickness.
     density : Mass per volume, by parts of the body, for --stability; a uniform one need not be given.
     friction : Coefficient of friction, by contact parts (in 3D also F1,F2); without it and --friction-slope it is

@@ -544,6 +544,8 @@ def cell_stresses(problem: AnyProblem, u: ArrayLike) -> Floats:
     values = np.einsum("mst,mt->ms", moduli, body.means(mesh.displacements(u)))
     if mesh.initial_stress is not None:
         values = values + mesh.initial_stress
+    if mesh.stress_slope is not None:
+        values = values + np.asarray(u)[-1] * mesh.stress_slope
     d = 3 if mesh.axisymmetric else mesh.points.shape[1]
     stresses = np.zeros((len(mesh.cells), d, d))
     for row, (i, j) in enumerate(COMPONENTS[body.components]):

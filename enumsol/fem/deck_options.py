@@ -193,7 +193,7 @@ def _check_contacts(deck: Deck, parts: DeckParts) -> None:
         raise InvalidArgumentError(f"{deck.path} has no *CONTACT PAIR; expected contact")
     for pair in said.pairs:
         for name in (pair.slave, pair.master):
-            parts.check_surface(name, pair.place, "CONTACT PAIR")
+            parts.check_surface(name, pair.place, "CONTACT PAIR", faced=name == pair.master)
         if pair.interaction not in said.interactions:
             raise InvalidArgumentError(
                 f"{pair.place}: *CONTACT PAIR names the interaction {pair.interaction or 'nothing'}; expected one of "

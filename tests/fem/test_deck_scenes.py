@@ -78,6 +78,7 @@ RIGHT = {
     "a clearance": (deck(contact=CONTACT + "*CLEARANCE, SLAVE=UNDER, MASTER=ON, VALUE=0.004\n"), {"pairs": [("UNDER", "ON", 0.004)]}),
     "a press fit": (deck(contact=CONTACT + "*CLEARANCE, MASTER=ON, SLAVE=UNDER, VALUE=-0.004\n"), {"pairs": [("UNDER", "ON", -0.004)]}),
     "contact of a surface of nodes": (deck(mesh=MESH + "*SURFACE, NAME=POINTS, TYPE=NODE\n11\n12\n13\n", contact=CONTACT.replace("UNDER", "POINTS")), {}),
+    "contact of nodes without facets": (deck(mesh=MESH + "*SURFACE, NAME=CORNERS, TYPE=NODE\n11\n13\n", contact=CONTACT.replace("UNDER", "CORNERS")), {"pairs": [("CORNERS", "ON")]}),
     "gaps that are closed": (deck(mesh=LIFTED, contact=CONTACT.replace("DRY\nUNDER", "DRY, ADJUST=0.01\nUNDER")), {}),
     "a press fit that is taken away": (deck(mesh=LIFTED.replace("1.004", "0.996"), contact=CONTACT.replace("DRY\nUNDER", "DRY, ADJUST=0.\nUNDER")), {}),
     "named surfaces of all contacts": (deck(contact="*SURFACE INTERACTION, NAME=DRY\n*FRICTION\n0.3\n*CONTACT\n*CONTACT INCLUSIONS\nUNDER, ON\n*CONTACT PROPERTY ASSIGNMENT\n , , DRY\n"), {}),
@@ -94,7 +95,7 @@ RIGHT = {
     "friction that changes to none": (deck(steps=step("*CHANGE FRICTION, INTERACTION=DRY\n*FRICTION\n0.\n" + DOWN + PUSH)), {"friction": 0.0}),
 }  # fmt: skip
 PARTS = {
-    "nodes": {"EDGE": [8, 11], "NODE": [8], "POINTS": [6, 7, 8]},
+    "nodes": {"EDGE": [8, 11], "NODE": [8], "POINTS": [6, 7, 8], "CORNERS": [6, 8]},
     "bodies": {"LAST": [3]},
 }
 
@@ -153,7 +154,7 @@ WRONG = {
     "surfaces that cannot part": (deck(contact=CONTACT.replace("*FRICTION", "*SURFACE BEHAVIOR, NO SEPARATION\n*FRICTION")), r"line \d+: \*SURFACE BEHAVIOR has NO SEPARATION"),
     "large displacements, and how to do without": (deck(steps=step(DOWN, ", NLGEOM=YES")), r"line \d+: \*STEP has NLGEOM.*--ignore NLGEOM \(in Python"),
     "a frequency analysis": (deck(steps=PRESSED + "*STEP\n*FREQUENCY\n5\n*END STEP\n"), r"line \d+: \*FREQUENCY is another analysis than \*STATIC.*--ignore FREQUENCY"),
-    "a surface of nodes that are no facets": (deck(mesh=MESH + "*SURFACE, NAME=POINTS, TYPE=NODE\n11\n13\n", contact=CONTACT.replace("UNDER", "POINTS")), r"line \d+: \*SURFACE POINTS has node 11, which belongs to no facet"),
+    "a surface of nodes that others face": (deck(mesh=MESH + "*SURFACE, NAME=POINTS, TYPE=NODE\n4\n6\n", contact=CONTACT.replace("UNDER, ON", "UNDER, POINTS")), r"line \d+: \*SURFACE POINTS has node 4, which belongs to no facet whose nodes are all in it; expected the nodes of whole facets"),
     "a surface of nodes and of faces": (deck(mesh=MESH + "*SURFACE, NAME=UNDER, TYPE=NODE\n11\n"), r"line \d+: \*SURFACE gives UNDER as nodes and as faces, also in model.inp line \d+"),
     "a surface of faces and of nodes": (deck(mesh=MESH + "*SURFACE, NAME=P, TYPE=NODE\n11\n*SURFACE, NAME=P\n11, S1\n"), r"line \d+: \*SURFACE gives P as nodes and as faces"),
     "a surface of nodes of no body": (deck(mesh=MESH + "*NODE\n99, 9., 9.\n*SURFACE, NAME=POINTS, TYPE=NODE\n99\n", contact=CONTACT.replace("UNDER", "POINTS")), r"line \d+: \*SURFACE POINTS has no node of a body"),
