@@ -113,7 +113,7 @@ def refuse_old_friction(source: object, options: Mapping[str, Any], written: Wri
     InvalidArgumentError
         The sentence says what to write.
     """
-    if not any(map(_is_pair, (own for name in FRICTION for _, own in _by_part(options.get(name))))):
+    if not any(map(is_pair, (own for name in FRICTION for _, own in _by_part(options.get(name))))):
         return source
     mesh = mesh_of(source, options.get("groups"))
     along_axes(mesh.points.shape[1], options, written)
@@ -125,14 +125,14 @@ def along_axes(dimension: int, options: Mapping[str, Any], written: Written) -> 
     found = dict(options)
     for name in FRICTION:
         for part, own in _by_part(options.get(name)):
-            if not _is_pair(own) or (dimension == 3 and not name.startswith("friction2")):
+            if not is_pair(own) or (dimension == 3 and not name.startswith("friction2")):
                 continue
             instead = old_friction(own, *(partial(written, option, str(part)) for option in (name, f"{name}_slope")))
             more = "" if dimension == 3 or name.endswith("_slope") else f": {instead}"
             raise InvalidArgumentError(
                 f"{name}{part and f' of {part}'} is the pair {shown(own)}; expected one coefficient{more}"
             )
-    pairs = [name for name in FRICTION if any(_is_pair(own) for _, own in _by_part(options.get(name)))]
+    pairs = [name for name in FRICTION if any(is_pair(own) for _, own in _by_part(options.get(name)))]
     if not pairs:
         return found
     second = [name for name in ("friction2", "friction2_slope") if options.get(name) is not None]
@@ -141,14 +141,15 @@ def along_axes(dimension: int, options: Mapping[str, Any], written: Written) -> 
     for name in ("friction", "friction_slope"):
         other, value = name.replace("friction", "friction2"), options.get(name)
         if isinstance(value, Mapping):
-            both = {part: own if _is_pair(own) else (own, own) for part, own in value.items()}
+            both = {part: own if is_pair(own) else (own, own) for part, own in value.items()}
             found[name], found[other] = ({part: own[k] for part, own in both.items()} for k in (0, 1))
         elif value is not None:
-            found[name], found[other] = value if _is_pair(value) else (value, value)
+            found[name], found[other] = value if is_pair(value) else (value, value)
     return found
 
 
-def _is_pair(value: object) -> bool:
+def is_pair(value: object) -> bool:
+    """True of two coefficients, along the axes of a body in 3D."""
     return isinstance(value, (tuple, list)) and len(value) == 2
 
 

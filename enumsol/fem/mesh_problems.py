@@ -360,7 +360,7 @@ def mesh_scene(mesh: PartedMesh | str | os.PathLike[str] | Any, **options: Any) 
 
 
 def _defaults() -> dict[str, Any]:
-    """Options of `mesh_problem` with their defaults; ``inspect.Parameter.empty`` for those that have none."""
+    """Options of `mesh_problem` with their defaults."""
     known = inspect.signature(mesh_problem).parameters.items()
     return {name: parameter.default for name, parameter in known if name != "mesh"}
 
@@ -463,9 +463,7 @@ def check_keys(options: Mapping[str, Any], spelled: Callable[[str], str] = str, 
             close = difflib.get_close_matches(name, [*known, *also], n=1)
             hint = f"did you mean {close[0]}?" if close else f"expected some of mesh, {', '.join(known)}"
             raise InvalidArgumentError(f"there is no option {shown(name)}; {hint}")
-    missing = [name for name, default in known.items() if default is inspect.Parameter.empty and name not in options]
-    if "orthotropic" not in options:
-        missing += [name for name in ("young", "poisson") if name not in options]
+    missing = [name for name in ("young", "poisson") if name not in options and "orthotropic" not in options]
     if not {"contact", "pairs"} & options.keys():
         missing.append("contact")
     if missing:

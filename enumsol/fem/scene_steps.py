@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from enumsol.errors import InvalidArgumentError, InvalidProblemError
-from enumsol.fem.conditions import FRICTION
+from enumsol.fem.conditions import FRICTION, is_pair
 from enumsol.fem.mesh_problems import scene_of
 from enumsol.loading.steps import LoadStep
 from enumsol.support.arguments import alpha_value, shown
@@ -37,9 +37,10 @@ def scene_steps(scene: Scene, steps: Iterable[Mapping[str, Any]]) -> list[LoadSt
     ----------
     scene : Scene
     steps : sequence of mappings
-        Any of ``alpha``; ``friction``, as in `LoadStep` or by names of all contact parts; ``displacement`` of nodes
-        without contact that the scene holds; and, as in `mesh_problem`, ``temperature``, ``load``, ``pressure``,
-        ``body_force``, ``force`` and ``moment``, the last five also with ``_slope``.
+        Any of ``alpha``; ``friction``, as in `LoadStep`, in 3D also as a pair along both axes, or by names of all
+        contact parts; ``displacement`` of nodes without contact that the scene holds; and, as in `mesh_problem`,
+        ``temperature``, ``load``, ``pressure``, ``body_force``, ``force`` and ``moment``, the last five also with
+        ``_slope``.
 
     Returns
     -------
@@ -49,7 +50,7 @@ def scene_steps(scene: Scene, steps: Iterable[Mapping[str, Any]]) -> list[LoadSt
     Raises
     ------
     InvalidArgumentError
-        A step is not of that form, or lacks the alpha on which its load depends.
+        A step is not of that form, or lacks the alpha on which its load depends; or another code made the stiffness.
     InvalidProblemError
         A step changes more than loads, displacements of nodes without contact, and friction.
 
@@ -65,6 +66,8 @@ def scene_steps(scene: Scene, steps: Iterable[Mapping[str, Any]]) -> list[LoadSt
     (1, 1)
     """
     tables = list(steps)
+    if scene.stiffness is not None:
+        raise InvalidArgumentError("the stiffness of the scene is of another code; expected its steps in the deck")
     for number, table in enumerate(tables, 1):
         _check(number, table)
     first, loaded = scene.problem(), any(table.keys() & {*_LOADS} for table in tables)
@@ -99,14 +102,14 @@ def _check(number: int, table: object) -> None:
 def _step(scene: Scene, first: AnyProblem, number: int, table: Mapping[str, Any], loaded: bool) -> LoadStep:
     options, friction = scene.options, table.get("friction")
     given: dict[str, Any] = {name: _given(getattr(options, name), table[name]) for name in _LOADS if name in table}
-    if isinstance(friction, Mapping):
+    along = isinstance(friction, Mapping) or (scene.dimension == 3 and is_pair(friction))
+    if along:
         given |= {**dict.fromkeys(FRICTION), "friction": friction}
     try:
         alpha = alpha_value(table["alpha"]) if "alpha" in table else None
         problem = scene_of(scene.mesh, replace(options, **given)).problem() if given else first
         refuse_other(first, problem, "it")
-        by_parts = problem.friction if isinstance(friction, Mapping) else friction
-        return LoadStep(alpha, by_parts, _load(problem, alpha) if loaded else None)
+        return LoadStep(alpha, problem.friction if along else friction, _load(problem, alpha) if loaded else None)
     except (InvalidArgumentError, InvalidProblemError) as error:
         raise type(error)(f"step {number}: {error}") from error
 

@@ -1,7 +1,10 @@
 """Steps of a history of a scene against load vectors that are made by hand, and against problems of one step alone."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
+from parted_solids import solid
 
 import enumsol
 from enumsol import fem
@@ -104,6 +107,18 @@ def test_friction_by_parts_and_for_all():
         fem.scene_steps(made, [{"friction": {"bottom": 0.1}}])
 
 
+def test_friction_along_two_axes_in_3d():
+    given = {**GIVEN, "friction": [0.3, 0.2]}
+    made = fem.mesh_scene(solid((1, 1, 1), 8), **given)
+    steps = fem.scene_steps(made, [{"friction": [0.1, 0.4]}, {"friction": {"bottom": [0.5, 0.6]}}, {}])
+    problem = made.problem()
+    for step, pair in zip(steps, ([0.1, 0.4], [0.5, 0.6]), strict=False):
+        assert np.array_equal(step.friction, np.tile(pair, (problem.p, 1)))
+        assert step.load is None
+    assert problem.p == 2  # a pair is not taken as one coefficient for each node
+    assert steps[2].friction is None
+
+
 def test_the_history_ends_in_roots_of_the_last_load_alone():
     """Without friction there is no memory: each step has the roots of its load."""
     made = scene(friction=0.0)
@@ -134,3 +149,9 @@ def test_what_cannot_be_a_step_is_refused(steps, words):
     mesh = fem.PartedMesh(BLOCK.points, BLOCK.cells, BLOCK.facets, node_sets={"edge": edge})
     with pytest.raises((enumsol.InvalidArgumentError, enumsol.InvalidProblemError), match=words):
         fem.scene_steps(fem.mesh_scene(mesh, **GIVEN), steps)
+
+
+def test_a_stiffness_of_another_code_is_refused():
+    made = replace(scene(), stiffness=scene().problem().A)
+    with pytest.raises(enumsol.InvalidArgumentError, match="the stiffness of the scene is of another code"):
+        fem.scene_steps(made, [{}])
