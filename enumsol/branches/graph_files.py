@@ -255,7 +255,7 @@ def _problem_record(problem: AnyProblem) -> dict[str, Any]:
 
 
 #: Arrays of the material of a mesh.
-_MATERIAL = ("lame", "elasticity", "initial_stress")
+_MATERIAL = ("lame", "elasticity", "initial_stress", "stress_slope")
 
 
 def _listed(array: Floats | None) -> list[Any] | None:

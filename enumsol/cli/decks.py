@@ -103,7 +103,7 @@ def deck_named(name: str) -> DeckModel:
 
 
 def ignored() -> tuple[str, ...]:
-    """What --ignore names."""
+    """Names that --ignore gives."""
     return _CHOSEN.get().ignore
 
 

@@ -17,6 +17,7 @@ from enumsol.support.messages import counted
 if TYPE_CHECKING:
     from enumsol.loading.growing import HistoryProgress
     from enumsol.loading.history import History
+    from enumsol.loading.steps import LoadStep
     from enumsol.model.problem3d import AnyProblem
 
 Drawn = Annotated[
@@ -60,8 +61,8 @@ def history(
 
     Parameters
     ----------
-    steps : A CSV file with the columns alpha, friction or f0, f1, ...; or a list of alphas such as 0,1/2,1,0. Default:
-        the key steps of a .toml PROBLEM, or those of a deck.
+    steps : A CSV file with the columns alpha, friction or f0, f1, ...; a list of alphas such as 0,1/2,1,0; or a .toml
+        file with the key steps, such as tables [[steps]] of loads. Default: those of a .toml PROBLEM or of a deck.
     arithmetic : verified: rigorous error bounds, with proof. fast: floats and a tolerance, never proven. exact:
         rationals throughout, for small problems in 2D.
     follow : Which roots of a step start the next one: all, the nearest, or all but those that run away.
@@ -128,7 +129,7 @@ def _told(state: HistoryProgress) -> tuple[float, str]:
 
 
 def _steps(problem: str, steps: str | None) -> Any:
-    """The steps of the option, or of the problem's TOML file.
+    """The steps of the option, which may name a TOML file, or of the problem's TOML file.
 
     Raises
     ------
@@ -137,29 +138,33 @@ def _steps(problem: str, steps: str | None) -> Any:
     """
     from enumsol.loading.steps import read_steps  # numpy: not for --help
 
-    if steps is not None:
+    if steps is not None and not steps.endswith(common.TOML):
         if Path(steps).suffix.lower() == ".csv" or Path(steps).is_file():
             return read_steps(steps)
         return [part.strip() for part in steps.split(",")]
-    said = common.described(problem).get("steps")
+    file = problem if steps is None else steps
+    said = common.described(file).get("steps")
     if said is None:
+        what = "is missing" if steps is None else f"{steps} has no steps or cannot be read"
         raise InvalidArgumentError(
-            "--steps is missing; expected a CSV file, a list of alphas, or steps in a .toml file"
+            f"--steps {what}; expected a CSV file, a list of alphas, or steps in a {common.TOML} file"
         )
     if isinstance(said, str):
-        return read_steps(Path(problem).parent / said)
+        return read_steps(Path(file).parent / said)
     if isinstance(said, list) and said and all(isinstance(item, dict) for item in said):
-        return [_of_table(k, item) for k, item in enumerate(said, 1)]
+        return _of_scene(problem, said)
     return said
 
 
-def _of_table(number: int, item: dict[str, Any]) -> Any:
-    from enumsol.loading.steps import LoadStep  # as above
+def _of_scene(problem: str, tables: list[dict[str, Any]]) -> list[LoadStep]:
+    from enumsol.fem import scene_steps  # as above
 
-    unknown = item.keys() - {"alpha", "friction"}
-    if unknown:
-        raise InvalidArgumentError(f"step {number} has {', '.join(sorted(unknown))}; expected alpha and friction")
-    return LoadStep(**item)
+    scene = common.scene_of(problem)
+    if scene is None:
+        raise InvalidArgumentError(
+            f"--steps has tables [[steps]], and {problem} has no mesh; expected a {common.TOML} file or a deck"
+        )
+    return scene_steps(scene, tables)
 
 
 def _write_proof(found: History, path: str) -> None:

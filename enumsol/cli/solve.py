@@ -149,6 +149,7 @@ MESH_OPTIONS = {
     "thickness": Given(_BODY, "[NAME=]LENGTH", _number),
     "expansion": Given(_BODY, "[NAME=]NUMBER", _number),
     "temperature": Given(_LOAD, "[NAME=]NUMBER", _number),
+    "temperature_slope": Given(_LOAD, "[NAME=]NUMBER", _number),
     "density": Given(_BODY, "[NAME=]DENSITY", _number),
     "friction": Given(_BODY, "[NAME=]F", _number_or_numbers),
     "friction_slope": Given(_BODY, "[NAME=]F", _number_or_numbers),
@@ -177,6 +178,8 @@ MESH_OPTIONS = {
     "pressure_slope": Given(_LOAD, "NAME=P", _number),
     "body_force": Given(_LOAD, "[NAME=]fx,fy[,fz]", _numbers),
     "body_force_slope": Given(_LOAD, "[NAME=]fx,fy[,fz]", _numbers),
+    "centrifugal": Given(_LOAD, "NAME=c,x,y,z,ax,ay,az", _numbers),
+    "centrifugal_slope": Given(_LOAD, "NAME=c,x,y,z,ax,ay,az", _numbers),
     "force": Given(_LOAD, _PULL, _numbers),
     "force_slope": Given(_LOAD, _PULL, _numbers),
     "moment": Given(_LOAD, "NAME=M[,My,Mz]", _number_or_numbers),
@@ -236,6 +239,7 @@ def solve(
         deck are.
     expansion : Coefficient of thermal expansion, by parts of the body.
     temperature : Change of temperature, by parts of the body, of nodes or of the boundary.
+    temperature_slope : The same, times alpha.
     thickness : In 2D, thickness; by default all forces are per unit thickness.
     density : Mass per volume, by parts of the body, for --stability; a uniform one need not be given.
     friction : Coefficient of friction, by contact parts (in 3D also F1,F2); without it and --friction-slope it is
@@ -268,6 +272,8 @@ def solve(
     pressure_slope : The same, times alpha.
     body_force : Force per volume, such as the weight, by parts of the body.
     body_force_slope : The same, times alpha.
+    centrifugal : Density times speed squared of a part of the body that turns, a point on the axis, and its direction.
+    centrifugal_slope : The same, times alpha.
     force : Force on each node of a part or set of nodes, in 2D of the whole thickness.
     force_slope : The same, times alpha.
     moment : Moment on a reference point.

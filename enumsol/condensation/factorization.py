@@ -152,7 +152,7 @@ class Factorization(Immutable):
 
     @property
     def columns(self) -> int:
-        """How many right sides it is best to solve for at once."""
+        """Number of right sides that are best solved for at once."""
         blocks = self._parts[1]
         return RHS_BLOCK if blocks is None else max(RHS_BLOCK, min(4 * RHS_BLOCK, LONGEST // len(blocks.pivots)))
 

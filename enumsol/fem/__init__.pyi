@@ -27,6 +27,7 @@ from .meshes import (
     rectangle as rectangle,
     trapezoid as trapezoid,
 )
+from .scene_steps import scene_steps as scene_steps
 from .scenes import Scene as Scene
 from .solid_problems import (
     facet_forces as facet_forces,

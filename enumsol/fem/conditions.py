@@ -54,6 +54,7 @@ class Options:
     thickness: float | Mapping[str, float]
     expansion: float | Mapping[str, float] | None
     temperature: ArrayLike | Mapping[str, float] | None
+    temperature_slope: ArrayLike | Mapping[str, float] | None
     density: float | Mapping[str, float] | None
     friction: Coefficients
     friction_slope: Coefficients
@@ -78,6 +79,8 @@ class Options:
     pressure_slope: Mapping[str, float] | None
     body_force: ArrayLike | Mapping[str, ArrayLike] | None
     body_force_slope: ArrayLike | Mapping[str, ArrayLike] | None
+    centrifugal: Mapping[str, ArrayLike] | None
+    centrifugal_slope: Mapping[str, ArrayLike] | None
     force: Vectors
     force_slope: Vectors
     moment: Mapping[str, Any] | None
@@ -112,7 +115,7 @@ def refuse_old_friction(source: object, options: Mapping[str, Any], written: Wri
     InvalidArgumentError
         The sentence says what to write.
     """
-    if not any(map(_is_pair, (own for name in FRICTION for _, own in _by_part(options.get(name))))):
+    if not any(map(is_pair, (own for name in FRICTION for _, own in _by_part(options.get(name))))):
         return source
     mesh = mesh_of(source, options.get("groups"))
     along_axes(mesh.points.shape[1], options, written)
@@ -124,14 +127,14 @@ def along_axes(dimension: int, options: Mapping[str, Any], written: Written) -> 
     found = dict(options)
     for name in FRICTION:
         for part, own in _by_part(options.get(name)):
-            if not _is_pair(own) or (dimension == 3 and not name.startswith("friction2")):
+            if not is_pair(own) or (dimension == 3 and not name.startswith("friction2")):
                 continue
             instead = old_friction(own, *(partial(written, option, str(part)) for option in (name, f"{name}_slope")))
             more = "" if dimension == 3 or name.endswith("_slope") else f": {instead}"
             raise InvalidArgumentError(
                 f"{name}{part and f' of {part}'} is the pair {shown(own)}; expected one coefficient{more}"
             )
-    pairs = [name for name in FRICTION if any(_is_pair(own) for _, own in _by_part(options.get(name)))]
+    pairs = [name for name in FRICTION if any(is_pair(own) for _, own in _by_part(options.get(name)))]
     if not pairs:
         return found
     second = [name for name in ("friction2", "friction2_slope") if options.get(name) is not None]
@@ -140,14 +143,15 @@ def along_axes(dimension: int, options: Mapping[str, Any], written: Written) -> 
     for name in ("friction", "friction_slope"):
         other, value = name.replace("friction", "friction2"), options.get(name)
         if isinstance(value, Mapping):
-            both = {part: own if _is_pair(own) else (own, own) for part, own in value.items()}
+            both = {part: own if is_pair(own) else (own, own) for part, own in value.items()}
             found[name], found[other] = ({part: own[k] for part, own in both.items()} for k in (0, 1))
         elif value is not None:
-            found[name], found[other] = value if _is_pair(value) else (value, value)
+            found[name], found[other] = value if is_pair(value) else (value, value)
     return found
 
 
-def _is_pair(value: object) -> bool:
+def is_pair(value: object) -> bool:
+    """True of two coefficients, along the axes of a body in 3D."""
     return isinstance(value, (tuple, list)) and len(value) == 2
 
 
@@ -160,6 +164,8 @@ def _in_python(option: str, part: str, number: str) -> str:
     return f'{option}={{"{part}": {number}}}' if part else f"{option}={number}"
 
 
+#: Components of a centrifugal force below this part of its numbers are rounding.
+_ROUNDING = 1e-9
 #: What stands for a component that is not given.
 FREE = "free"
 #: Numbers that an obstacle takes in 2D and 3D: a point and a normal, or a centre and a radius.
@@ -391,6 +397,10 @@ def nodal_forces(body: NodalBasis, mesh: PartedMesh, options: Options, slope: st
     total = part_forces(body, mesh, loads, pressures, slope)
     if volume is not None:
         total += body.volume_forces(body_force_of(mesh, volume, f"body_force{slope}"))
+    turning = getattr(options, f"centrifugal{slope}")
+    if turning is not None:
+        density, slopes = centrifugal_of(mesh, turning, f"centrifugal{slope}", axisymmetric=body.axisymmetric)
+        total += body.volume_forces(density, slopes)
     points, axes = by_part(options.reference, "reference"), frames_of(mesh, options.transform).axes
     for part, value in by_part(forces, f"force{slope}").items():
         if part not in points:
@@ -414,6 +424,39 @@ def body_force_of(mesh: PartedMesh, value: object, name: str) -> Floats:
     for part, force in by_part(value, name).items():
         density[mesh.body(part)] += short_vector(force, f"{name} of {part}", dimension)
     return density
+
+
+def centrifugal_of(mesh: PartedMesh, value: object, name: str, *, axisymmetric: bool = False) -> tuple[Floats, Floats]:
+    """Force per volume c (1 - a a') (x - x0) of parts that turn about an axis, as its value at 0 and its derivative.
+
+    By cells, (M, d) and (M, d, d) [force / length^3, force / length^4]; c is density times speed squared.
+
+    Raises
+    ------
+    InvalidArgumentError
+        A part does not exist or has not seven numbers, the axis has no direction, or the force leaves the plane or is
+        not that of an axisymmetric body.
+    """
+    d = mesh.points.shape[1]
+    constant, slopes = np.zeros((len(mesh.cells), d)), np.zeros((len(mesh.cells), d, d))
+    for part, given in by_part(value, name).items():
+        own = f"{name} of {part}"
+        numbers = short_vector(given, own, 7)
+        if not np.any(numbers[4:]):
+            raise InvalidArgumentError(f"{own} has an axis without a direction; expected one, the last three numbers")
+        (axis,) = unit_vectors(numbers[None, 4:], own)
+        slope = numbers[0] * (np.eye(3) - np.outer(axis, axis))
+        at_origin = -slope @ numbers[1:4]
+        across = max(np.max(np.abs(slope[d:, :d]), initial=0.0), np.max(np.abs(at_origin[d:]), initial=0.0))
+        if axisymmetric:
+            across = max(across, np.max(np.abs(slope[:d, 1])), np.max(np.abs(at_origin)))
+        if across > _ROUNDING * np.max(np.abs(numbers)):
+            expected = "the y axis of an axisymmetric body" if axisymmetric else "one across the plane, or within it"
+            raise InvalidArgumentError(f"{own} has the axis {shown(numbers[1:].tolist())}; expected {expected}")
+        rows = mesh.body(part)
+        constant[rows] += at_origin[:d]
+        slopes[rows] += slope[:d, :d]
+    return constant, slopes
 
 
 def part_forces(body: NodalBasis, mesh: PartedMesh, loads: object, pressures: object, slope: str = "") -> Floats:

@@ -48,7 +48,7 @@ class Pair:
 
     Attributes
     ----------
-    slave : name of the part whose nodes are contact nodes
+    slave : name of the part whose nodes are contact nodes: of facets, or of nodes alone
     master : name of the part whose facets these nodes face
     gap : float or None
         Replaces the gap of the geometry [length].
@@ -142,9 +142,9 @@ class Contacts:
     parts : list of p str
         The part that each belongs to, the first one of several.
     facets : (k, c) int array
-        Of all these parts.
+        Of all these parts, none of those that are given by nodes.
     areas : (p,) array
-        Of the contact surface around each, in 2D its length [length^2, in 2D length].
+        Of the contact surface around each, in 2D its length; 0 of nodes without facets [length^2, in 2D length].
     groups : list of Group
         One for all contact parts, then one for each pair; the nodes come in this order.
     """
@@ -169,7 +169,8 @@ class Contacts:
             own = slice(first, first := first + group.count)
             if not np.any(kept[own]):
                 raise InvalidArgumentError(f"contact of {group} has no node that can be in contact; expected some")
-            areas[own] *= np.sum(areas[own]) / np.sum(areas[own][kept[own]])
+            if np.any(areas[own]):
+                areas[own] *= np.sum(areas[own]) / np.sum(areas[own][kept[own]])
             groups.append(replace(group, normals=group.normals[kept[own]], count=int(np.sum(kept[own]))))
         old = self.rows
         rows = replace(
@@ -181,7 +182,7 @@ class Contacts:
 
 
 def contacts_of(body: NodalBasis, mesh: PartedMesh, options: Options, held: Supports) -> Contacts:
-    """Contact nodes on the facets of parts, and of the first part of every pair.
+    """Contact nodes on the facets of parts, and of the first part of every pair, which may be nodes without facets.
 
     A node that several of them share belongs to the contact parts, or to the first pair.
 
@@ -200,12 +201,13 @@ def contacts_of(body: NodalBasis, mesh: PartedMesh, options: Options, held: Supp
     on: dict[str, Integers] = {}
     areas, taken = [], np.zeros(0, dtype=np.int64)
     for names, pair in groups:
-        facets = _facets(body, {name: mesh.part(name) for name in names})
+        facets = np.zeros((0, mesh.points.shape[1]), dtype=np.int64)
+        if pair is None or not is_of_nodes(mesh, pair.slave):
+            facets = on[names[0]] = _facets(body, {name: mesh.part(name) for name in names})
         rows, gaps, group = _group(
             body, mesh, names, facets, held, options.obstacle if pair is None else None, pair, taken
         )
         found.append((rows, gaps, group))
-        on[names[0]] = facets
         areas.append(body.on_part(facets, names[0], lambda _: 1.0, lumped=True)[rows.nodes, 0])
         taken = np.concatenate([taken, rows.nodes])
     rows = ContactRows(
@@ -216,16 +218,21 @@ def contacts_of(body: NodalBasis, mesh: PartedMesh, options: Options, held: Supp
         np.arange(len(taken)),
     )
     names = list(dict.fromkeys([*parts, *(pair.slave for pair in pairs)]))
-    gaps, facets = np.concatenate([gaps for _, gaps, _ in found]), _facets(body, on)
+    gaps, facets = np.concatenate([gaps for _, gaps, _ in found]), _facets(body, on) if on else facets
     of_groups = [group for _, _, group in found]
     return Contacts(rows, gaps, _parts(mesh, names, taken), facets, np.concatenate(areas), of_groups)
+
+
+def is_of_nodes(mesh: PartedMesh, part: str) -> bool:
+    """True for a part that is given by nodes and not by facets."""
+    return part in mesh.node_sets and part not in mesh.facets
 
 
 def _parts(mesh: PartedMesh, names: list[str], nodes: Integers) -> list[str]:
     """The first part that each node belongs to."""
     of_node = np.full(len(mesh.points), -1)
     for k in reversed(range(len(names))):
-        of_node[mesh.part(names[k])] = k
+        of_node[mesh.nodes(names[k]) if is_of_nodes(mesh, names[k]) else mesh.part(names[k])] = k
     return [names[k] for k in of_node[nodes]]
 
 
@@ -247,11 +254,7 @@ def _group(
     taken: Integers,
 ) -> tuple[ContactRows, Floats, Group]:
     """Contact nodes with their normals on some facets, and the distances to what they face."""
-    dimension = mesh.points.shape[1]
-    touching = along(facets) if dimension == 2 else contact_nodes(dimension, facets)
-    if body.axisymmetric:  # a uniform pressure has no part at the node of an edge of second order on the axis
-        shares = body.on_part(facets, parts[0], lambda _: 1.0)[touching, 0]
-        touching = touching[shares > _NO_SHARE * np.max(shares)]
+    touching = _touching(body, parts[0], facets) if len(facets) else mesh.nodes(parts[0])
     shared = int(np.sum(np.isin(touching, taken)))
     touching = touching[~np.isin(touching, taken)]
     if pair is None and np.all(held.fixed[touching]):
@@ -261,6 +264,11 @@ def _group(
             f"all nodes of {parts[0]} belong to another contact already; expected a boundary of its own for the pair "
             f"{pair}"
         )
+    if pair is not None and not len(facets):
+        normals = normals_against(body, mesh, touching, pair.master)
+        normals = unit_vectors(np.where(held.mirrored[touching], 0.0, normals), "normals at the plane of symmetry")
+        rows, gaps, group = _paired(body, mesh, touching, normals, held, pair)
+        return rows, gaps, replace(group, shared=shared)
     # the circumference is none on the axis, which has a normal all the same
     integrals = replace(body, axisymmetric=False).on_part(facets, "contact", np.asarray, lumped=True)
     if obstacle is None:
@@ -269,7 +277,7 @@ def _group(
         normals = unit_vectors(np.where(held.mirrored[touching], 0.0, normals), "normals at the plane of symmetry")
         own, gaps = normals, np.zeros(len(touching))
     else:
-        given = Obstacle.of(obstacle, dimension)
+        given = Obstacle.of(obstacle, mesh.points.shape[1])
         normals, gaps = given.normals_and_gaps(mesh.points[touching])
         own = np.nan_to_num(integrals[touching] / np.linalg.norm(integrals[touching], axis=1, keepdims=True))
         if np.all(np.sum(own * normals, axis=1) < _BEHIND):
@@ -282,6 +290,16 @@ def _group(
         return nodes, gaps[nodes.kept], Group(parts, None, own[nodes.kept], len(nodes.nodes))
     rows, gaps, group = _paired(body, mesh, touching, normals, held, pair)
     return rows, gaps, replace(group, shared=shared)
+
+
+def _touching(body: NodalBasis, part: str, facets: Integers) -> Integers:
+    """Nodes of facets that have contact rows, in 2D in the order along them."""
+    dimension = body.shape[1]
+    touching = along(facets) if dimension == 2 else contact_nodes(dimension, facets)
+    if body.axisymmetric:  # a uniform pressure has no part at the node of an edge of second order on the axis
+        shares = body.on_part(facets, part, lambda _: 1.0)[touching, 0]
+        touching = touching[shares > _NO_SHARE * np.max(shares)]
+    return touching
 
 
 def _paired(
@@ -315,8 +333,15 @@ def facing(
     return faced(mesh.points, nodes, normals, facets, outward, others)
 
 
-def facing_normals(body: NodalBasis, mesh: PartedMesh, part: str) -> tuple[Integers, Floats]:
-    """All nodes of a part, and the means of the normals of the facets around them, which corners have as well."""
+def facing_normals(body: NodalBasis, mesh: PartedMesh, pair: Pair) -> tuple[Integers, Floats]:
+    """All nodes of the first part, and the means of the normals of the facets around them, which corners have as well.
+
+    Of nodes without facets they are those of `normals_against`.
+    """
+    part = pair.slave
+    if is_of_nodes(mesh, part):
+        nodes = mesh.nodes(part)
+        return nodes, normals_against(body, mesh, nodes, pair.master)
     facets = _facets(body, {part: mesh.part(part)})
     of_facets = unit_vectors(body.on_part(facets, part, np.asarray)[facets].sum(axis=1), f"normals of {part}")
     sums = np.zeros(mesh.points.shape)
@@ -344,6 +369,29 @@ def along(edges: Integers) -> Integers:
 
 
 # -- what the nodes of one part of a pair face on the other (theory, section 11.8) -------------------------------------
+
+
+def normals_against(body: NodalBasis, mesh: PartedMesh, nodes: Integers, master: str) -> Floats:
+    """Normals (k, d) of nodes without facets: opposite to the normal of a part at its point nearest to each.
+
+    Where facets meet at this point, it is the mean of their normals.
+
+    Raises
+    ------
+    InvalidArgumentError
+        The normals there cancel each other.
+    """
+    facets = _facets(body, {master: mesh.part(master)})
+    away = body.on_part(facets, master, np.asarray)[facets].sum(axis=1)
+    targets = _Facets.all_of(mesh.points, facets)
+    tolerance = _TOUCHING * float(np.max(np.ptp(mesh.points, axis=0)))
+    sums = np.zeros((len(nodes), mesh.points.shape[1]))
+    for k, point in enumerate(mesh.points[nodes]):
+        rows, distances, normals = map(np.concatenate, zip(*(own.nearest(point) for own in targets), strict=True))
+        near = distances <= np.min(distances) + tolerance
+        sides = np.sign(np.sum(normals * away[rows], axis=1))
+        sums[k] = -np.sum((sides[:, None] * normals)[near], axis=0)
+    return unit_vectors(sums, f"normals of {master}")
 
 
 def faced(
@@ -462,8 +510,7 @@ class _Facets:
 
         with np.errstate(all="ignore"):  # what diverges is not taken
             for _ in range(_STEPS if len(near) else 0):
-                tangents = np.einsum("mkq,qmd->qdk", self.kind.slopes(at), facets)
-                J, off = np.concatenate([tangents, direction], axis=2), left()
+                J, off = np.concatenate([self._tangents(facets, at), direction], axis=2), left()
                 # where the line is parallel to the facet, or nearly, it goes astray
                 flat = ~(np.abs(np.linalg.det(J)) > _AT_NODE * np.prod(np.linalg.norm(J, axis=1), axis=1))
                 J[flat], off[flat] = np.eye(len(normal)), 1.0
@@ -474,3 +521,41 @@ class _Facets:
             met = np.flatnonzero(self.inside(at) & (np.linalg.norm(left(), axis=1) <= tolerance))
         rows = self.rows[near[met]].tolist()
         return list(zip(gap[met].tolist(), rows, self.kind.values(at[met]).T, strict=True))
+
+    def nearest(self, point: Floats) -> tuple[Integers, Floats, Floats]:
+        """Facets that may be nearest to a point, their distances, and unit normals where they are nearest."""
+        off = np.linalg.norm(self.centres - point, axis=1)
+        near = np.flatnonzero(off - self.reach <= np.min(off + self.reach))
+        facets, corners = self.places[near], self.kind.places[: self.kind.corners]
+        ends = zip(corners, np.roll(corners, -1, axis=0), strict=True)
+        found = [self._foot(facets, point, one, (two - one)[None]) for one, two in ends]
+        if len(corners) > 2:
+            found.append(self._foot(facets, point, self.centre, np.eye(2)))
+        every = np.array([self._distances(facets, point, at) for at in found])
+        best = np.argmin(every, axis=0), np.arange(len(near))
+        tangents = self._tangents(facets, np.array(found)[best])
+        across = tangents[:, ::-1, 0] * [1.0, -1.0] if len(corners) == 2 else np.cross(*np.moveaxis(tangents, 2, 0))
+        return self.rows[near], every[best], unit_vectors(across, "normals of facets")
+
+    def _tangents(self, facets: Floats, at: Floats) -> Floats:
+        """Derivatives (q, d, d - 1) of the positions at places (q, d - 1) of the reference."""
+        return np.asarray(np.einsum("mkq,qmd->qdk", self.kind.slopes(at), facets))
+
+    def _distances(self, facets: Floats, point: Floats, at: Floats) -> Floats:
+        """Distances (q,) of places of the reference from a point; infinite outside of the facets."""
+        off = np.einsum("mq,qmd->qd", self.kind.values(at), facets) - point
+        return np.where(self.inside(at), np.linalg.norm(off, axis=1), np.inf)
+
+    def _foot(self, facets: Floats, point: Floats, start: Floats, along: Floats) -> Floats:
+        """Places (q, d - 1) nearest to a point, by Gauss and Newton: from ``start`` along one edge, or everywhere."""
+        is_edge = len(along) < len(start) or self.kind.form == "line"
+        least, most = (0.0, 1.0) if is_edge else (-2.0, 3.0)
+        steps = np.zeros((len(facets), len(along)))
+        for _ in range(_STEPS):
+            at = start + steps @ along
+            off = point - np.einsum("mq,qmd->qd", self.kind.values(at), facets)
+            ahead = np.linalg.pinv(self._tangents(facets, at) @ along.T) @ off[:, :, None]
+            before, steps = steps, np.clip(steps + ahead[:, :, 0], least, most)
+            if np.max(np.abs(steps - before)) < _CONVERGED:
+                break
+        return np.asarray(start + steps @ along)

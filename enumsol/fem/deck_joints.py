@@ -69,7 +69,7 @@ class DeckJoints:
                 self._add("tie", [pair.slave, pair.master, *([] if pair.adjust is None else [pair.adjust])])
         for tie in said.ties:
             for name in (tie.slave, tie.master):
-                self.parts.check_surface(name, tie.place, "TIE")
+                self.parts.check_surface(name, tie.place, "TIE", faced=name == tie.master)
             self._add("tie", [tie.slave, tie.master, *([] if tie.tolerance is None else [tie.tolerance])])
         for coupling in said.couplings:
             self._couple(coupling)

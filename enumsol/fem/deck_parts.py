@@ -66,13 +66,16 @@ class DeckParts:
             self._names[key] = name
         return self._names[key]
 
-    def check_surface(self, name: str, place: DeckPlace, card: str) -> None:
-        """Refuse what is no surface of a card of contacts; a surface of nodes becomes the facets that have these.
+    def check_surface(self, name: str, place: DeckPlace, card: str, *, faced: bool = False) -> None:
+        """Refuse what is no surface of a card of contacts.
+
+        A surface of nodes becomes the facets that have these. If some belong to no such facet, it stays one of nodes,
+        unless it is ``faced``.
 
         Raises
         ------
         InvalidArgumentError
-            There is none, or a node of it belongs to no facet of such nodes.
+            There is none, it has no node of a body, or is one of nodes that others would face.
         """
         own = self._deck.surfaces.get(name)
         if own is None:
@@ -84,15 +87,21 @@ class DeckParts:
         faces = faces_of_nodes(self._deck, rows)
         covered = [nodes.ravel() for _, nodes in face_nodes(self._deck, faces)]
         bare = np.setdiff1d(rows, np.concatenate([np.zeros(0, dtype=np.int64), *covered]))
-        if len(bare) or not len(rows):
+        if not len(rows) or (len(bare) and faced):
             lost = f"node {self._deck.node_name(int(bare[0]))}" if len(bare) else "no node of a body"
+            lacks = ", which belongs to no facet whose nodes are all in it" if len(bare) else ""
             raise InvalidArgumentError(
-                f"{own.place}: *SURFACE {name} has {lost}, which belongs to no facet whose nodes are all in it; "
-                "expected the nodes of whole facets, or TYPE=ELEMENT"
+                f"{own.place}: *SURFACE {name} has {lost}{lacks}; expected "
+                f"{'the nodes of whole facets, or TYPE=ELEMENT' if faced else 'nodes of bodies'}"
             )
-        self._deck.surfaces[name] = Surface(own.place, faces)
-        entry = Account(own.place, "SURFACE", f"nodes of {name} are those of {counted(len(faces), 'facet')}")
-        self._deck.account.append(entry)
+        if len(bare):
+            became = f"{counted(len(rows), 'node')} of {name} without facets: each has its forces, none has a pressure"
+        else:
+            self._deck.surfaces[name] = Surface(own.place, faces)
+            became = f"nodes of {name} are those of {counted(len(faces), 'facet')}"
+        entry = Account(own.place, "SURFACE", became)
+        if entry not in self._deck.account:
+            self._deck.account.append(entry)
 
     def in_bodies(self, rows: Integers) -> Integers:
         """Nodes among these that belong to bodies."""

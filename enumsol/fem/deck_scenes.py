@@ -23,6 +23,7 @@ from enumsol.fem.deck_options import acting, contacts, is_plane, shared
 from enumsol.fem.deck_parts import DeckParts
 from enumsol.fem.deck_stiffness import CODES, with_calculix
 from enumsol.fem.mesh_problems import mesh_scene
+from enumsol.fem.scene_steps import refuse_other
 from enumsol.loading.steps import LoadStep
 from enumsol.support.arguments import file_path, one_of, positive_integer
 from enumsol.support.messages import counted
@@ -245,16 +246,11 @@ class DeckModel:
             A step changes more than loads, displacements of nodes without contact, and friction.
         """
         first = self.problem(1)
-        found = [LoadStep(load=first.f, friction=first.friction)]
-        for number in range(2, self.step_count + 1):
+        found = []
+        for number, step in enumerate(self.deck.analysis.steps, 1):
             other = self.problem(number)
-            what = _differs(first, other)
-            if what is not None:
-                place = self.deck.analysis.steps[number - 1].place
-                raise InvalidProblemError(
-                    f"{place}: step {number} changes {what}; expected steps that change loads, friction and "
-                    f"displacements of nodes without contact (enumsol roots with --step {number} takes the step alone)"
-                )
+            alone = f" (enumsol roots with --step {number} takes the step alone)"
+            refuse_other(first, other, f"{step.place}: step {number}", alone)
             found.append(LoadStep(load=other.f, friction=other.friction))
         return found
 
@@ -292,14 +288,3 @@ def account_of(deck: Deck) -> str:
 def _lines(lines: list[int]) -> str:
     some = ", ".join(map(str, lines[:3]))
     return f"line{'s' if len(lines) > 1 else ''} {some}" + (f" and {len(lines) - 3} more" if len(lines) > 3 else "")
-
-
-def _differs(first: AnyProblem, other: AnyProblem) -> str | None:
-    """Data that two problems do not share but for load and friction, in words."""
-    if first.p != other.p or (first.n == other.n and (first.Bn != other.Bn).nnz):
-        return "which pairs are in contact, or what is held"
-    if first.n != other.n or (first.A != other.A).nnz:
-        return "what is held"
-    if np.any(first.gap != other.gap) or np.any(first.slip_offset != other.slip_offset):
-        return "the displacement of nodes that are in contact or faced by such"
-    return None

@@ -244,7 +244,7 @@ def _spread(name: str, dofs: Integers, nodes: Integers, weights: Floats, motions
 
 def _tie(body: NodalBasis, mesh: PartedMesh, value: Any, found: Joints) -> None:
     pair = Pair.of(value, "tie")
-    nodes, normals = facing_normals(body, mesh, pair.slave)
+    nodes, normals = facing_normals(body, mesh, pair)
     apart = ~np.isin(nodes, mesh.nodes(pair.master))
     nodes, normals = nodes[apart], normals[apart]
     met, weights, gaps = facing(body, mesh, nodes, normals, pair.master)

@@ -280,7 +280,7 @@ class Temperature:
     cells: Floats
 
     @classmethod
-    def of(cls, mesh: PartedMesh, value: object) -> Temperature:
+    def of(cls, mesh: PartedMesh, value: object, name: str) -> Temperature:
         """Change of temperature by one number, by a number for every node, or by names of parts.
 
         Raises
@@ -290,24 +290,24 @@ class Temperature:
         """
         made = cls(np.zeros(len(mesh.points)), np.zeros(len(mesh.cells)))
         if not isinstance(value, Mapping):
-            array = real_array(value, "temperature", error=InvalidArgumentError)
+            array = real_array(value, name, error=InvalidArgumentError)
             if array.shape not in ((), made.nodes.shape):
                 raise InvalidArgumentError(
-                    f"temperature has shape {array.shape}; expected a number, {made.nodes.shape} for all nodes, or "
+                    f"{name} has shape {array.shape}; expected a number, {made.nodes.shape} for all nodes, or "
                     "names of parts with their values"
                 )
             made.nodes[:] = array
             return made
-        given = by_part(value, "temperature")
+        given = by_part(value, name)
         bodies = [part for part in given if part in mesh.bodies]
         if bodies and len(bodies) < len(given):
             other = next(part for part in given if part not in bodies)
             raise InvalidArgumentError(
-                f"temperature is given for {bodies[0]}, a part of the body, and for {other}, a part of its nodes or "
+                f"{name} is given for {bodies[0]}, a part of the body, and for {other}, a part of its nodes or "
                 "boundary; expected parts of one kind"
             )
         for part, own in given.items():
-            number = finite_number(own, f"temperature of {part}")
+            number = finite_number(own, f"{name} of {part}")
             if bodies:
                 made.cells[mesh.body(part)] = number
             else:
@@ -315,18 +315,27 @@ class Temperature:
         return made
 
 
-def thermal_forces(body: NodalBasis, mesh: PartedMesh, options: Options, material: Material) -> tuple[Floats, Floats]:
-    """Nodal forces (N, d) of thermal strains, and the mean stresses (M, s) that the body has with no displacement.
+def thermal_forces(
+    body: NodalBasis, mesh: PartedMesh, options: Options, material: Material, others: Floats, slope: str = ""
+) -> tuple[Floats, Floats | None]:
+    """Nodal forces (N, d) of thermal strains and ``others``, and the stresses (M, s) of the body with no displacement.
+
+    The stresses are means of cells, None without thermal strains; with ``slope`` "_slope" both are derivatives.
 
     Raises
     ------
     InvalidArgumentError
         temperature is given without expansion, or is not of its form.
     """
+    name = f"temperature{slope}"
+    given = getattr(options, name)
+    if given is None:
+        return others, None
     if material.thermal is None:
-        raise InvalidArgumentError("temperature is given without expansion; expected both")
-    change = Temperature.of(mesh, options.temperature)
-    return body.stressed(-material.thermal, change.nodes, change.cells)
+        raise InvalidArgumentError(f"{name} is given without expansion; expected both")
+    change = Temperature.of(mesh, given, name)
+    forces, stresses = body.stressed(-material.thermal, change.nodes, change.cells)
+    return others + forces, stresses
 
 
 def thickness_of(mesh: PartedMesh, value: object) -> Floats | None:

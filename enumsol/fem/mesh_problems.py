@@ -72,15 +72,14 @@ def scene_of(source: PartedMesh | str | os.PathLike[str] | Any, options: Options
     joints = joints_of(body, mesh, options, held)
     masses = masses_of(mesh, options.density, thickness)
     contacts = contacts_of(body, mesh, options, held)
-    forces, slope = (conditions.nodal_forces(body, mesh, options, which) for which in ("", "_slope"))
-    stress = None
-    if options.temperature is not None:
-        warmed, stress = thermal_forces(body, mesh, options, material)
-        forces = forces + warmed
+    (forces, stress), (slope, warming) = (
+        thermal_forces(body, mesh, options, material, conditions.nodal_forces(body, mesh, options, which), which)
+        for which in ("", "_slope")
+    )
     springs = joints.padded(conditions.part_springs(body, mesh, options.spring)) + joints.springs
     scene = Scene(
         mesh, options, body, held, joints, contacts, forces, slope, sp.csc_array(springs), material,
-        pieces_of(mesh, axisymmetric), masses, stress,
+        pieces_of(mesh, axisymmetric), masses, stress, warming,
     )  # fmt: skip
     refuse_overlaps(scene)
     refuse_walls(scene)
@@ -127,6 +126,7 @@ def mesh_problem(
     thickness: float | Mapping[str, float] = 1.0,
     expansion: float | Mapping[str, float] | None = None,
     temperature: ArrayLike | Mapping[str, float] | None = None,
+    temperature_slope: ArrayLike | Mapping[str, float] | None = None,
     density: float | Mapping[str, float] | None = None,
     friction: float | Mapping[str, float] | None = None,
     friction_slope: float | Mapping[str, float] | None = None,
@@ -151,6 +151,8 @@ def mesh_problem(
     pressure_slope: Mapping[str, float] | None = None,
     body_force: ArrayLike | Mapping[str, ArrayLike] | None = None,
     body_force_slope: ArrayLike | Mapping[str, ArrayLike] | None = None,
+    centrifugal: Mapping[str, ArrayLike] | None = None,
+    centrifugal_slope: Mapping[str, ArrayLike] | None = None,
     force: Vectors = None,
     force_slope: Vectors = None,
     moment: Mapping[str, Any] | None = None,
@@ -195,8 +197,10 @@ def mesh_problem(
         The contact boundary, in contact with a rigid foundation.
     pairs : sequence of (slave, master) or (slave, master, gap)
         Parts of two bodies that may touch each other. The nodes of the first part are the contact nodes; each is in
-        contact with the point of a facet of the second part on the line along its normal (theory, section 11.8). Nodes
-        that face no facet have no contact. The gap is the distance along the normal, or the one that is given [length].
+        contact with the point of a facet of the second part on the line along its normal (theory, section 11.8). The
+        first part may be a set of nodes (``node_sets`` of the mesh), whose normals are against those of the second at
+        its points nearest to them; then there are no ``areas``. Nodes that face no facet have no contact. The gap is
+        the distance along the normal, or the one that is given [length].
     plane : {"strain", "stress", "axisymmetric"}, or mapping of names to them, optional
         In 2D, whether strain or stress is plane, for the whole body or for every part of it; by default strain. It has
         to be given for a file whose elements are of plane stress (CPS4 and the like). Of an axisymmetric body x is the
@@ -207,9 +211,10 @@ def mesh_problem(
         they are per unit thickness [length].
     expansion : float, or mapping of names to float, optional
         Coefficient of thermal expansion, of the whole body or of every part of it [1 / temperature].
-    temperature : float, (N,) array_like, or mapping of names to float, optional
+    temperature, temperature_slope : float, (N,) array_like, or mapping of names to float, optional
         Change of temperature from the one at which the body has no stress: uniform, of every node, of parts of the body
-        (``mesh.bodies``), or of parts that are given by nodes or facets; 0 for what is not named.
+        (``mesh.bodies``), or of parts that are given by nodes or facets; 0 for what is not named. And its derivative
+        with respect to alpha; with it the last entry of u is alpha.
     density : float, or mapping of names to float, optional
         Mass per volume, of the whole body or of every part of it, for `stability`; a uniform one changes no verdict and
         need not be given [force time^2 / length^4].
@@ -258,6 +263,11 @@ def mesh_problem(
     body_force, body_force_slope : vector, or mapping of names to vectors, optional
         Force per volume, such as the weight, on the whole body or on parts of it, and its derivative with respect to
         alpha [force / length^3].
+    centrifugal, centrifugal_slope : mapping of names of parts of the body to seven numbers, optional
+        Of parts that turn at a constant speed: density times speed squared (in radians per time), a point on the axis
+        and its direction, and its derivative with respect to alpha. At a distance r from the axis the force per volume
+        is the first of them times r [force / length^4]. Points and directions have three components in 2D as well; an
+        axisymmetric body turns about y.
     force, force_slope : mapping of names to vectors
         Force on each node of a part or set of nodes in x, y (and z), in 2D of the whole thickness, and its derivative
         with respect to alpha [force].
@@ -305,13 +315,14 @@ def mesh_problem(
     given = Options(
         young=young, poisson=poisson, orthotropic=orthotropic, orientation=orientation,
         incompatible=incompatible, contact=contact, pairs=pairs, plane=plane, thickness=thickness,
-        expansion=expansion, temperature=temperature, density=density,
+        expansion=expansion, temperature=temperature, temperature_slope=temperature_slope, density=density,
         friction=friction, friction_slope=friction_slope, friction2=friction2, friction2_slope=friction2_slope,
         axis=axis, clamp=clamp, symmetry=symmetry, displacement=displacement,
         displacement_slope=displacement_slope, transform=transform, tie=tie, reference=reference, rigid=rigid,
         coupling=coupling, equations=equations, spring=spring, node_spring=node_spring,
         load=load, load_slope=load_slope, pressure=pressure, pressure_slope=pressure_slope, body_force=body_force,
-        body_force_slope=body_force_slope, force=force, force_slope=force_slope,
+        body_force_slope=body_force_slope, centrifugal=centrifugal,
+        centrifugal_slope=centrifugal_slope, force=force, force_slope=force_slope,
         moment=moment, moment_slope=moment_slope,
         gap=gap, obstacle=obstacle, max_rigid_displacement=max_rigid_displacement, groups=groups,
     )  # fmt: skip
@@ -357,7 +368,7 @@ def mesh_scene(mesh: PartedMesh | str | os.PathLike[str] | Any, **options: Any) 
 
 
 def _defaults() -> dict[str, Any]:
-    """Options of `mesh_problem` with their defaults; ``inspect.Parameter.empty`` for those that have none."""
+    """Options of `mesh_problem` with their defaults."""
     known = inspect.signature(mesh_problem).parameters.items()
     return {name: parameter.default for name, parameter in known if name != "mesh"}
 
@@ -368,7 +379,7 @@ def read_mesh_problem(path: str | os.PathLike[str]) -> AnyProblem:
     In the file, ``pairs`` may also be called ``contact_pair``.
 
     The file may also have a ``title`` and ``units`` of forces and lengths such as "N,mm", for what commands print,
-    and the ``steps`` of a history, which the command ``enumsol history`` reads.
+    and the ``steps`` of a history, which the command ``enumsol history`` reads, see `scene_steps`.
 
     Parameters
     ----------
@@ -460,9 +471,7 @@ def check_keys(options: Mapping[str, Any], spelled: Callable[[str], str] = str, 
             close = difflib.get_close_matches(name, [*known, *also], n=1)
             hint = f"did you mean {close[0]}?" if close else f"expected some of mesh, {', '.join(known)}"
             raise InvalidArgumentError(f"there is no option {shown(name)}; {hint}")
-    missing = [name for name, default in known.items() if default is inspect.Parameter.empty and name not in options]
-    if "orthotropic" not in options:
-        missing += [name for name in ("young", "poisson") if name not in options]
+    missing = [name for name in ("young", "poisson") if name not in options and "orthotropic" not in options]
     if not {"contact", "pairs"} & options.keys():
         missing.append("contact")
     if missing:

@@ -2,8 +2,8 @@
 
 A contact row needs both components of its node. Where one of them is held at zero, as on a plane of symmetry, it stays
 in the problem as a degree of freedom of its own that nothing moves: it is uncoupled from the body, its displacement is
-zero in every solution, and so is the tangential force along it. Displacements that grow with alpha leave one degree of
-freedom that is alpha. All builders of contact problems in 2D and 3D end in `problem_of`.
+zero in every solution, and so is the tangential force along it. Displacements and temperatures that grow with alpha
+leave one degree of freedom that is alpha. All builders of contact problems in 2D and 3D end in `problem_of`.
 """
 
 from __future__ import annotations
@@ -154,6 +154,8 @@ class Body:
         Between rows of A.
     named : callable
         Names of rows of A, for messages.
+    warmed : bool
+        True if its temperature depends on alpha, which then is a degree of freedom.
     """
 
     A: sp.csc_array
@@ -163,6 +165,7 @@ class Body:
     dofs: Integers | None = None
     equations: Sequence[Equation] = ()
     named: Callable[[int], str] = "displacement {}".format
+    warmed: bool = False
 
     @classmethod
     def of_nodes(
@@ -274,7 +277,7 @@ def problem_of(
         check_independent(contact, sp.csr_array(sp.vstack(rows) @ T))
     load = body.f - body.A @ given.offset if np.any(given.offset) else body.f
     slope = body.load_slope
-    driven = np.any(given.slope)
+    driven = body.warmed or np.any(given.slope)
     if driven:
         follows = followed(sp.csr_array(T @ sp.diags_array(kept)), given.slope, sp.csr_array(sp.vstack(rows)))
         slope = (0.0 if slope is None else slope) - body.A @ follows

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import TYPE_CHECKING, Any, cast
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import scipy.sparse as sp
@@ -19,7 +19,7 @@ from enumsol.fem.contacts import Contacts, Group
 from enumsol.fem.joints import Joints, resized
 from enumsol.fem.meshes import PartedMesh, unit_vectors
 from enumsol.fem.restrained import Body, Supports, axes_of, problem_of
-from enumsol.model.cells import KINDS, boundary_facets, by_kind, facet_outlines, lines_along
+from enumsol.model.cells import KINDS, boundary_facets, by_kind, facet_outlines, facet_rows, lines_along
 from enumsol.model.mass import consistent_mass
 from enumsol.model.mesh import BodyMesh
 from enumsol.model.problem import given_friction
@@ -73,6 +73,8 @@ class Scene:
         Mass per volume, in 2D per area, of the cells; None where it is uniform and not given.
     stress : (M, s) array or None
         Mean stresses of the cells with no displacement, of a change of temperature [force / length^2].
+    stress_slope : (M, s) array or None
+        Their derivatives with respect to alpha.
     stiffness : (k, k) csc_array or None
         What another code assembled in place of the body's own: by all displacements, and behind them those that only
         its elements have [force / length].
@@ -93,6 +95,7 @@ class Scene:
     pieces: list[BodyPiece]
     masses: Floats | None = None
     stress: Floats | None = None
+    stress_slope: Floats | None = None
     stiffness: sp.csc_array | None = None
     notes: list[str] = field(default_factory=list)
 
@@ -197,12 +200,8 @@ class Scene:
         """
         mesh, contacts, supports = self.mesh, self.contacts, self.held
         nodes = contacts.rows
-        surface = contacts.facets if any(group.pair is not None for group in contacts.groups) else None
-        more: dict[str, Any] = {}
-        if self.dimension == 3:
-            from enumsol.fem.solid_problems import outward  # not for plane bodies
-
-            surface, more = outward(contacts.facets, mesh.cells), {"areas": contacts.areas}
+        more = {"areas": contacts.areas} if self.dimension == 3 and np.all(contacts.areas > 0) else {}
+        surface = self._surface()
         gaps, coefficients = self.gaps, self.coefficients
         modes, bound = self._rigid_modes()
         mass = self._mass()
@@ -223,6 +222,7 @@ class Scene:
                 supports,
                 equations=self.joints.equations,
                 named=named,
+                warmed=self.stress_slope is not None,
             ),
             nodes,
             self.tangents,
@@ -238,6 +238,21 @@ class Scene:
         )
         return afresh(problem, notes=tuple(self.notes))
 
+    def _surface(self) -> Integers | None:
+        """Facets of the contact surface, in 3D as seen from outside, and those around nodes without facets."""
+        contacts, cells, d = self.contacts, self.mesh.cells, self.dimension
+        alone = contacts.rows.nodes[contacts.areas == 0]
+        if len(alone):
+            outer = boundary_facets(d, cells)
+            around = np.flatnonzero(np.any(np.isin(outer, alone), axis=1))
+            rows = {*facet_rows(d, contacts.facets, outer), *around.tolist()}
+            return outer[np.array(sorted(rows), dtype=np.int64)]
+        if d == 3:
+            from enumsol.fem.solid_problems import outward  # not for plane bodies
+
+            return outward(contacts.facets, cells)
+        return contacts.facets if any(group.pair is not None for group in contacts.groups) else None
+
     def _kept(self) -> dict[str, Floats | None]:
         """Material that the problem keeps of its mesh."""
         lame = self.material.lame
@@ -245,6 +260,7 @@ class Scene:
             "lame": lame,
             "elasticity": self.material.elasticity if lame is None else None,
             "initial_stress": self.stress,
+            "stress_slope": self.stress_slope,
         }
 
     def _mass(self) -> sp.csc_array | None:
@@ -360,9 +376,11 @@ def _material(scene: Scene) -> list[str]:
     given = [name for name in ("density", "expansion") if getattr(scene.options, name) is not None]
     laws = [name for name in ("young", "poisson", "orthotropic", "orientation") if _given(scene, name)]
     names = (*laws, *(("plane", "thickness") if scene.dimension == 2 else ()), *given)
-    warm = scene.options.temperature
-    alone = isinstance(warm, (Mapping, int, float))
-    told = [] if warm is None else [f"temperature {_said(cast('Any', warm)) if alone else 'by nodes'}"]
+    told = []
+    for name in ("temperature", "temperature_slope"):
+        if (warm := getattr(scene.options, name)) is not None:
+            alone = isinstance(warm, (Mapping, int, float))
+            told.append(f"{name} {_said(warm) if alone else 'by nodes'}")
     return [f"{name} {_said(getattr(scene.options, name))}" for name in names] + told
 
 

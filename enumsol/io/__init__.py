@@ -19,8 +19,8 @@ The first three hold the arrays of `ContactProblem` or of `ContactProblem3D` by 
     - ``node_ids``: (p,) integers, floats or strings.
     - ``mesh_points`` (N, d), ``mesh_cells`` (M, k) and either ``mesh_motion`` (d N, n; dense or in sparse parts) or
       ``mesh_dofs`` (n,): a `BodyMesh`, or the arguments of ``BodyMesh.of_dofs``, all or none; with it ``mesh_offset``
-      (N, d), ``mesh_lame`` (M, 2) or ``mesh_elasticity`` (M, s s), ``mesh_stress`` (M, s), and in 3D ``mesh_facets``
-      (k, m) and ``mesh_rows`` (k,).
+      (N, d), ``mesh_lame`` (M, 2) or ``mesh_elasticity`` (M, s s), ``mesh_stress`` and ``mesh_stress_slope`` (M, s),
+      and in 3D ``mesh_facets`` (k, m) and ``mesh_rows`` (k,).
     - ``enumsol_format``: version of this layout, now 1; taken as 1 when left out.
 
     Names that begin with an underscore are ignored; any other name is refused, since it may be a misspelt one.

@@ -78,9 +78,11 @@ _SYNONYMS = {
 _COMMON = ("gap", "friction", "load_slope", "slip_offset", "node_ids", "coordinates", "mass")
 #: Names of the arrays of a BodyMesh: one of "mesh_motion" and "mesh_dofs" is required, and all of MESH.
 MESH = ("mesh_points", "mesh_cells")
-SURFACE = ("mesh_offset", "mesh_facets", "mesh_rows", "mesh_lame", "mesh_elasticity", "mesh_stress")
+#: Of changes of temperature.
+_STRESSES = ("mesh_stress", "mesh_stress_slope")
+SURFACE = ("mesh_offset", "mesh_facets", "mesh_rows", "mesh_lame", "mesh_elasticity", *_STRESSES)
 _MESH = (*MESH, "mesh_motion", "mesh_dofs", *SURFACE)
-_MESH_TABLES = (*MESH, "mesh_offset", "mesh_facets", "mesh_lame", "mesh_elasticity", "mesh_stress")
+_MESH_TABLES = (*MESH, "mesh_offset", "mesh_facets", "mesh_lame", "mesh_elasticity", *_STRESSES)
 #: Of a body that nothing holds.
 RIGID = ("rigid_modes", "max_rigid_displacement")
 LAYOUT_2D = Layout(
@@ -231,7 +233,8 @@ def arrays_of(problem: AnyProblem) -> dict[str, Any]:
     if mesh is not None:
         more |= {"mesh_points": mesh.points, "mesh_cells": mesh.cells, "mesh_motion": mesh.motion}
         moduli = None if mesh.elasticity is None else mesh.elasticity.reshape(len(mesh.cells), -1)
-        kept = (mesh.offset, mesh.facets, mesh.rows, mesh.lame, moduli, mesh.initial_stress)
+        stresses = mesh.initial_stress, mesh.stress_slope
+        kept = (mesh.offset, mesh.facets, mesh.rows, mesh.lame, moduli, *stresses)
         more |= dict(zip(SURFACE, kept, strict=True))
     if mean is not None:
         more |= dict(zip(MEAN, (mean.T1, mean.T2, mean.offset, mean.weights), strict=True))

@@ -282,13 +282,20 @@ def _body(meshio: ModuleType, problem: ContactProblem3D, mesh: BodyMesh, u: Floa
 
 
 def _nodes(problem: ContactProblem3D, mesh: BodyMesh) -> Integers:
-    """The node that each contact row stands for."""
-    rows = problem.contact_rows
-    rows = sp.csr_array(rows @ mesh.acting.T)
+    """The node that each contact row stands for: of a pair not those of the other part, which are on no facet."""
+    rows = sp.csr_array(problem.contact_rows @ mesh.acting.T)
+    if mesh.facets is not None:
+        own = np.isin(np.arange(len(mesh.points)), mesh.facets)
+        rows = sp.csr_array(rows @ sp.diags_array(np.repeat(own, 3).astype(np.float64)))
+        rows.eliminate_zeros()
     nodes = rows.indices // 3
-    first = nodes[rows.indptr[:-1]]
+    first = nodes[rows.indptr[:-1]] if np.all(np.diff(rows.indptr)) else np.full(3 * problem.p, -1)
     by_direction = first.reshape(3, problem.p)
-    if np.any(nodes != np.repeat(first, np.diff(rows.indptr))) or np.any(by_direction != by_direction[0]):
+    if (
+        np.any(first < 0)
+        or np.any(nodes != np.repeat(first, np.diff(rows.indptr)))
+        or np.any(by_direction != by_direction[0])
+    ):
         raise InvalidArgumentError(
             "problem has contact rows of more than one node, and its mesh has no facets and rows; expected both"
         )

@@ -44,6 +44,8 @@ class BodyMesh(Immutable):
         zz, xy, xz, yz); strains of shear are angles [force / length^2].
     initial_stress : (M, s) array_like or None
         Mean stress of every cell with no displacement, of a change of temperature [force / length^2].
+    stress_slope : (M, s) array_like or None
+        Its derivative with respect to the last entry of u, which is alpha.
 
     Raises
     ------
@@ -69,6 +71,7 @@ class BodyMesh(Immutable):
         lame: ArrayLike | None = None,
         elasticity: ArrayLike | None = None,
         initial_stress: ArrayLike | None = None,
+        stress_slope: ArrayLike | None = None,
     ) -> None:
         self.points = sealed(real_array(points, "mesh_points"))
         if self.points.ndim != 2 or self.points.shape[1] not in (2, 3):
@@ -92,12 +95,9 @@ class BodyMesh(Immutable):
             )
         self.lame = None if lame is None else _lame(lame, len(self.cells))
         self.elasticity = None if elasticity is None else _elasticity(elasticity, len(self.cells), d)
-        self.initial_stress = None if initial_stress is None else sealed(real_array(initial_stress, "mesh_stress"))
-        sizes = (4,) if self.axisymmetric else {2: (3,), 3: (6,)}[d]
-        if self.initial_stress is not None and self.initial_stress.shape != (len(self.cells), *sizes):
-            raise InvalidProblemError(
-                f"mesh_stress has shape {self.initial_stress.shape}; expected (M, s) = {(len(self.cells), *sizes)}"
-            )
+        shape = len(self.cells), 4 if self.axisymmetric else {2: 3, 3: 6}[d]
+        self.initial_stress = _stresses(initial_stress, "mesh_stress", shape)
+        self.stress_slope = _stresses(stress_slope, "mesh_stress_slope", shape)
         self._freeze()
 
     @property
@@ -241,6 +241,15 @@ def _lame(value: ArrayLike, count: int) -> Floats:
     if array.shape not in ((2,), (count, 2)):
         raise InvalidProblemError(f"mesh_lame has shape {array.shape}; expected (2,) or (M, 2) = ({count}, 2)")
     return sealed(np.tile(array, (count, 1)) if array.ndim == 1 else array)
+
+
+def _stresses(values: ArrayLike | None, name: str, shape: tuple[int, int]) -> Floats | None:
+    if values is None:
+        return None
+    found = sealed(real_array(values, name))
+    if found.shape != shape:
+        raise InvalidProblemError(f"{name} has shape {found.shape}; expected (M, s) = {shape}")
+    return found
 
 
 def _elasticity(value: ArrayLike, count: int, dimension: int) -> Floats:

@@ -280,7 +280,7 @@ class RootSet(Sequence[Root], Immutable):
         return self._examined(mass)[1]
 
     def _examined(self, mass: ArrayLike | sp.sparray | sp.spmatrix | None) -> tuple[Stabilities, tuple[Stability, ...]]:
-        """What proves the verdicts, and all of these; for the mass of the problem both are kept."""
+        """Verdicts and what proves them; for the mass of the problem both are kept."""
         from enumsol.roots.stability import Stabilities  # sparse graphs and solvers come with it
 
         verdicts, known = self._found.get("own", (None, None)) if mass is None else (None, None)

@@ -64,7 +64,7 @@ class LoadedSystem:
         self.g0, self.g1 = (side * slope, np.zeros_like(slope)) if side else (condensed.g0 / units.length, slope)
 
     def bordered(self, S: Floats, g: tuple[Floats, Floats], reach: Floats) -> LoadedSystem:
-        """The same of a body that nothing holds, by its matrix (14.9) and load and bounds of q."""
+        """System of a body that nothing holds, by its matrix (14.9) and load and bounds of q."""
         found = copy(self)
         found.S, (found.g0, found.g1), found.reach = S, g, reach
         return found

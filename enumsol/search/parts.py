@@ -250,8 +250,8 @@ class Spread(ABC):
     def _send(self, part: TreePart, *, whole: bool) -> None:
         """Hand out a part; ``whole``: with all that a worker needs, which may be much."""
         data, seconds = self._data if whole else None, self._remaining()
-        # later parts are longer: there are enough of them then, and each costs the same to hand out
-        nodes = self._nodes << min(len(part.place) - 1, DOUBLED)
+        # in a cluster each costs as much to hand out as a few dozen nodes: once there are enough they are longer
+        nodes = self._nodes if self._crew.near else self._nodes << min(len(part.place) - 1, DOUBLED)
         self._out[self._crew.submit(_examined, self._key, data, part.roots, nodes, seconds)] = part
 
     def _answered(self, part: TreePart) -> bool:

@@ -16,6 +16,7 @@ from enumsol.model.statuses import BACKWARD, FORWARD, OPEN, SLIP_MINUS, SLIP_PLU
 from enumsol.search.closing import TreeCloser
 from enumsol.support.deadlines import look
 from enumsol.trusted.at_alpha import solve_selection
+from enumsol.trusted.floating_bounds import is_unbalanced, motion_against
 from enumsol.trusted.selection import PENETRATION, SLIP_BACKWARD as BACK, SLIP_FORWARD as FORTH
 from enumsol.trusted.status_rows import FREE, row_signs
 
@@ -137,7 +138,7 @@ class LeadingCloser(ReferenceCloser):
     def _cover(self) -> Cover | None:
         """Leads the tree where that pays."""
         cover = None if self._reference is None else Cover([self._reference])
-        return cover if cover is not None and cover.pays else None
+        return cover if cover is not None and cover.is_whole and cover.pays else None
 
     @property
     def leads(self) -> bool:
@@ -260,6 +261,13 @@ class Cover:
         tried += [{stick[0]: self._with, i: self._against} for i in _some(self._second) if i != stick[0]]
         found = [self._closed(tuple(codes.get(i, UNDECIDED) for i in range(p))) is not None for codes in tried]
         return sum(found) >= _WORTH * len(found)
+
+    @cached_property
+    def is_whole(self) -> bool:
+        """True if balance excludes what neither sticks nor slips where a root does, so that no tree is left there."""
+        system = self._references[0].system
+        rest = tuple(self._back if i in self._first else UNDECIDED for i in range(system.p))
+        return is_unbalanced(system, rest, motion_against(system, rest))
 
     def _closed(self, codes: Codes) -> OnlyRoot | None:
         """Why no other root lies below an assignment; None where that is not proven."""

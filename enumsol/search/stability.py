@@ -145,7 +145,7 @@ class StabilitySearch:
             yield low, high
 
     def _by_plain(self, low: float, high: float) -> bool | None:
-        """Whether plain numbers serve in a range."""
+        """True if plain numbers serve in a range; None if they serve at neither end."""
         serving = [serve_at(self.stiffness, self.motions, mu) for mu in (low, high)]
         return (all(serving) and self._try(low, high)) if any(serving) else None
 
@@ -211,7 +211,7 @@ class StabilitySearch:
     # -- weights and products
 
     def _by_weights(self, low: float, high: float) -> bool | None:
-        """Whether weights and decided nodes serve in a range."""
+        """True if weights and decided nodes serve in a range; None if they were not tried."""
         if self.programs >= self.most_programs:
             return None
         at = float(np.sqrt(max(low, 1e-3 * high) * high))

@@ -96,6 +96,11 @@ class Crew:
             self._count, self._asked = max(sum(threads().values()), 1), now
         return self._count
 
+    @property
+    def near(self) -> bool:
+        """True for a pool of this machine, to which handing out a task costs little."""
+        return isinstance(getattr(self._executor, "_max_workers", None), int)
+
     def submit(self, function: Callable[..., Any], *arguments: Any) -> Job:
         """Hand out a task."""
         job = Job(function, arguments)

@@ -104,7 +104,7 @@ class EnclosedPiece:
 
     @cached_property
     def unbounded(self) -> EnclosedPiece:
-        """The same of a body that nothing holds, with a bound beyond which there is no solution in the piece."""
+        """Piece of a body that nothing holds, with a bound beyond which there is no solution in the piece."""
         first = self.ends[0]
         g, h = hull([Ball(end.g, end.g_rad) for end in self.ends]), hull([end.rows.h for end in self.ends])
         F = hull([Ball.exact(self.low), Ball.exact(self.high)])

@@ -152,7 +152,9 @@ class NoMotion:
         plain = np.array_equal(self.weights, np.eye(len(motions.signed)))
         left = motions.leaning[:, kept] if plain else motions.leaning @ Ball.exact(self.weights[:, kept])
         right = motions.moves[:, kept]
-        acts = (motions.leaning.size > 0).astype(float) @ (self.weights[:, kept] != 0) + right.size > 0
+        acts = (motions.leaning.size != 0).astype(float) @ (self.weights[:, kept] != 0) + right.size != 0
+        if not np.all(np.any(acts, axis=0)):
+            return False
         # zero minus zero has no radius: large matrices stay sparse
         apart = left - right
         forms = left, right, Ball(apart.mid, np.where(acts, apart.rad, 0.0))
@@ -470,7 +472,7 @@ def _definite(forms: tuple[Ball, Ball, Ball], acts: Mask, end: _End, N: Floats) 
     N : (q, q) array
     """
     (left, right, apart), (K, bend) = forms, end
-    own = np.any(acts[np.any(K.size > 0, axis=1)], axis=0)
+    own = np.any(acts[np.any(K.size != 0, axis=1)], axis=0)
     if np.any(N[~own]) or np.any(N[:, ~own]):
         return False
     if not np.any(own):
@@ -532,8 +534,11 @@ def _times(K: Ball, right: Ball) -> Ball:
 
 
 def _ratio(above: Fraction | int, below: Fraction) -> Ball:
-    """A quotient of rationals as a ball that can multiply matrices."""
-    value = float(above / below)
+    """A quotient of rationals as a ball that can multiply matrices; one that overflows is not finite."""
+    try:
+        value = float(above / below)
+    except OverflowError:
+        value = np.inf
     return Ball(np.array(value), np.array(2 * UNIT * abs(value) + TINY))
 
 
@@ -541,7 +546,7 @@ def positive(Q: Ball) -> bool:
     """True if all symmetric matrices in a ball are positive definite."""
     if not Q.finite or np.any(Q.mid.diagonal() <= 0):
         return False
-    unit = np.exp2(-np.round(0.5 * np.log2(Q.mid.diagonal())))
+    unit = np.ldexp(1.0, -np.round(0.5 * np.log2(Q.mid.diagonal())).astype(int))
     scale = unit[:, None] * unit
     return dense_eigenvalue_bound(Q.mid * scale) > float(upper_norm(Q.rad * scale + TINY)) * (1 + 2.0**-40)
 

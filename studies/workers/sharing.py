@@ -1,7 +1,8 @@
 """Tasks of a search and their sizes, and from these the time that any number of workers would take.
 
-The tasks are the same whatever the workers. They are run here one after the other, each with its processor time; then
-so many workers take them in the tree's order, and a task becomes known once the one that it follows on has ended.
+The tasks are the same whatever the number of workers; on a cluster they are longer. They are run here one after the
+other, each with its processor time; then so many workers take them in the tree's order, and a task becomes known once
+the one that it follows on has ended.
 """
 
 from __future__ import annotations
@@ -15,6 +16,7 @@ from unittest import mock
 
 import enumsol
 from enumsol.search.parts import Spread
+from enumsol.support.workers import Crew
 
 #: Seconds that a task costs more in its worker, and in the calling process: of a pool of processes, and of Dask.
 COSTS = {"pool": (0.0005, 0.0015), "dask": (0.004, 0.005)}
@@ -47,8 +49,8 @@ class Here(Executor):
         return future
 
 
-def tasks_of(problem, alpha, **limits):
-    """Tasks by their place in the tree, and processor time of the calling process."""
+def tasks_of(problem, alpha, *, near, **limits):
+    """Tasks by their place in the tree, and processor time of the calling process; of a pool, or of a cluster."""
     tasks, here, before = {}, Here(), Spread._further
 
     def further(self, part, answer):
@@ -57,7 +59,7 @@ def tasks_of(problem, alpha, **limits):
         tasks[part.place] = Task(here.times[id(answer)], answer.nodes, size, tuple(part.place for part in found))
         return found
 
-    with mock.patch.object(Spread, "_further", further):
+    with mock.patch.object(Spread, "_further", further), mock.patch.object(Crew, "near", near):
         started = time.process_time()
         enumsol.enumerate_roots(problem, alpha, executor=here, **limits)
         calling = time.process_time() - started - sum(here.times.values())
@@ -81,9 +83,9 @@ def wall(tasks, workers, in_worker, calling):
 
 def rows_of(problem, alpha, **limits):
     """One row for each kind of executor and number of workers."""
-    tasks, calling = tasks_of(problem, alpha, **limits)
-    work = sum(task.seconds for task in tasks.values())
     for kind, costs in COSTS.items():
+        tasks, calling = tasks_of(problem, alpha, near=kind == "pool", **limits)
+        work = sum(task.seconds for task in tasks.values())
         for workers in WORKERS:
             seconds = wall(tasks, workers, *costs)
             yield {

@@ -81,7 +81,17 @@ def test_steps_stand_in_the_toml_file_of_a_mesh(capsys, tmp_path):
     (tmp_path / "steps.csv").write_text("alpha, friction\n0, 0.5\n1, 0.25\n")
     assert "History of 2 steps" in run(capsys, "history", place)[1]
     place.write_text(text + "[[steps]]\nalph = 0\n")
-    assert_refused(*run(capsys, "history", place), "step 1 has alph; expected alpha and friction")
+    assert_refused(*run(capsys, "history", place), "step 1 has alph; expected some of alpha, friction, displacement")
+    place.write_text(text.replace("load_slope", "force") + "[[steps]]\n[[steps]]\nforce.1 = [0.0, -0.1]\n")
+    out = run(capsys, "history", place)[1]
+    assert "History of 2 steps: 1 history (verified)" in out
+    alone = text.replace("load_slope = {'1' = [0.3, 0.0]}", "force = {'1' = [0.0, -0.1]}")
+    (tmp_path / "steps.toml").write_text("[[steps]]\nforce.1 = [0.3, 0.0]\n[[steps]]\n")
+    place.write_text(alone)
+    assert run(capsys, "history", place, "--steps", tmp_path / "steps.toml")[1] == out
+    refusal = "has tables [[steps]], and gallery:one-node-6.1 has no mesh"
+    assert_refused(*run(capsys, *NODE, "--steps", tmp_path / "steps.toml"), refusal)
+    assert_refused(*run(capsys, *NODE, "--steps", tmp_path / "none.toml"), "none.toml has no steps or cannot be read")
 
 
 def test_what_is_left_open_is_an_exit_status(capsys, wedge):

@@ -59,6 +59,9 @@ RIGHT = {
     "gravity of all": (deck(mesh=MESH + "*ELSET, ELSET=EVERY\nUPPER, LOWER\n", steps=step(DOWN + "*DLOAD\nEVERY, GRAV, 9.81, 1., 0., 0.\n")),
         {"pressure": None, "body_force": {"UPPER": (2 * 9.81, 0), "LOWER": (3 * 9.81, 0)}}),
     "gravity of all elements": (deck(steps=step(DOWN + "*DLOAD\n, GRAV, 9.81, 1., 0., 0.\n")), {"pressure": None, "body_force": {"UPPER": (2 * 9.81, 0), "LOWER": (3 * 9.81, 0)}}),
+    "rotation": (deck(steps=step(DOWN + "*DLOAD\nUPPER, Centrif, 0.5, 1., 2., 0., 0., 0., 1.\n12, P2, 2.\n")), {"centrifugal": {"UPPER": (2 * 0.5, 1, 2, 0, 0, 0, 1)}}),
+    "rotation of all elements about an axis in the plane": (deck(steps=step(DOWN + "*DLOAD\n, CENTRIF, 0.5, 1., 0., 0., 0., 1.\n")),
+        {"pressure": None, "centrifugal": {"UPPER": (2 * 0.5, 1, 0, 0, 0, 1, 0), "LOWER": (3 * 0.5, 1, 0, 0, 0, 1, 0)}}),
     "forces per volume": (deck(steps=step(DOWN + "*DLOAD\nUPPER, BX, 0.5\nUPPER, BY, -0.25\n12, P2, 2.\n")), {"body_force": {"UPPER": (0.5, -0.25)}}),
     "force per volume of an element": (deck(steps=step(DOWN + "*DLOAD\n12, BX, 0.5\n")), {"pressure": None, "body_force": {"LAST": (0.5, 0)}}),
     "an amplitude": (deck(materials="*AMPLITUDE, NAME=RISE\n0., 0., 0.5, 0.5,\n2., 2.\n" + MATERIALS,
@@ -78,6 +81,7 @@ RIGHT = {
     "a clearance": (deck(contact=CONTACT + "*CLEARANCE, SLAVE=UNDER, MASTER=ON, VALUE=0.004\n"), {"pairs": [("UNDER", "ON", 0.004)]}),
     "a press fit": (deck(contact=CONTACT + "*CLEARANCE, MASTER=ON, SLAVE=UNDER, VALUE=-0.004\n"), {"pairs": [("UNDER", "ON", -0.004)]}),
     "contact of a surface of nodes": (deck(mesh=MESH + "*SURFACE, NAME=POINTS, TYPE=NODE\n11\n12\n13\n", contact=CONTACT.replace("UNDER", "POINTS")), {}),
+    "contact of nodes without facets": (deck(mesh=MESH + "*SURFACE, NAME=CORNERS, TYPE=NODE\n11\n13\n", contact=CONTACT.replace("UNDER", "CORNERS")), {"pairs": [("CORNERS", "ON")]}),
     "gaps that are closed": (deck(mesh=LIFTED, contact=CONTACT.replace("DRY\nUNDER", "DRY, ADJUST=0.01\nUNDER")), {}),
     "a press fit that is taken away": (deck(mesh=LIFTED.replace("1.004", "0.996"), contact=CONTACT.replace("DRY\nUNDER", "DRY, ADJUST=0.\nUNDER")), {}),
     "named surfaces of all contacts": (deck(contact="*SURFACE INTERACTION, NAME=DRY\n*FRICTION\n0.3\n*CONTACT\n*CONTACT INCLUSIONS\nUNDER, ON\n*CONTACT PROPERTY ASSIGNMENT\n , , DRY\n"), {}),
@@ -94,7 +98,7 @@ RIGHT = {
     "friction that changes to none": (deck(steps=step("*CHANGE FRICTION, INTERACTION=DRY\n*FRICTION\n0.\n" + DOWN + PUSH)), {"friction": 0.0}),
 }  # fmt: skip
 PARTS = {
-    "nodes": {"EDGE": [8, 11], "NODE": [8], "POINTS": [6, 7, 8]},
+    "nodes": {"EDGE": [8, 11], "NODE": [8], "POINTS": [6, 7, 8], "CORNERS": [6, 8]},
     "bodies": {"LAST": [3]},
 }
 
@@ -136,6 +140,10 @@ WRONG = {
     "a pressure on nothing": (deck(steps=step("*DLOAD\n, P2, 1.\n")), r"line \d+: \*DLOAD has a line without a node, an element or a set"),
     "gravity without a direction": (deck(steps=step("*DLOAD\nUPPER, GRAV, 9.81\n")), r"line \d+: \*DLOAD has GRAV without a direction"),
     "gravity in a long direction": (deck(steps=step("*DLOAD\nUPPER, GRAV, 9.81, 0., -2., 0.\n")), r"line \d+: \*DLOAD has GRAV with a direction of length 2"),
+    "rotation about no axis": (deck(steps=step("*DLOAD\nUPPER, CENTRIF, 0.5, 1., 2., 0.\n")), r"line \d+: \*DLOAD has CENTRIF without a direction; expected the speed squared, a point on the axis and three numbers"),
+    "rotation about a long axis": (deck(steps=step("*DLOAD\nUPPER, CENTRIF, 0.5, 1., 2., 0., 0., 0., 2.\n")), r"line \d+: \*DLOAD has CENTRIF with a direction of length 2"),
+    "rotation about two axes": (deck(steps=step("*DLOAD\nUPPER, CENTRIF, 0.5, 1., 2., 0., 0., 0., 1.\n11, CENTRIF, 0.5, 1., 0., 0., 0., 0., 1.\n")), r"line \d+: \*DLOAD has CENTRIF on element 11, as model.inp line \d+ has already; expected one axis"),
+    "rotation without density": (deck(materials=MATERIALS.replace("*DENSITY\n2.\n", ""), steps=step("*DLOAD\nUPPER, CENTRIF, 0.5, 1., 2., 0., 0., 0., 1.\n")), r"line \d+: \*DLOAD has CENTRIF on elements of SOFT, which has no \*DENSITY"),
     "gravity without density": (deck(materials=MATERIALS.replace("*DENSITY\n2.\n", ""), steps=step("*DLOAD\nUPPER, GRAV, 9.81, 0., -1., 0.\n")), r"line \d+: \*DLOAD has GRAV on elements of SOFT, which has no \*DENSITY"),
     "a surface that is none": (deck(steps=step("*DSLOAD\nRIGTH, P, 1.\n")), r"line \d+: there is no surface of faces RIGTH"),
     "a traction": (deck(steps=step("*DSLOAD\nRIGHT, TRVEC, 1., 1., 0.\n")), r"line \d+: \*DSLOAD has the load TRVEC"),
@@ -153,7 +161,7 @@ WRONG = {
     "surfaces that cannot part": (deck(contact=CONTACT.replace("*FRICTION", "*SURFACE BEHAVIOR, NO SEPARATION\n*FRICTION")), r"line \d+: \*SURFACE BEHAVIOR has NO SEPARATION"),
     "large displacements, and how to do without": (deck(steps=step(DOWN, ", NLGEOM=YES")), r"line \d+: \*STEP has NLGEOM.*--ignore NLGEOM \(in Python"),
     "a frequency analysis": (deck(steps=PRESSED + "*STEP\n*FREQUENCY\n5\n*END STEP\n"), r"line \d+: \*FREQUENCY is another analysis than \*STATIC.*--ignore FREQUENCY"),
-    "a surface of nodes that are no facets": (deck(mesh=MESH + "*SURFACE, NAME=POINTS, TYPE=NODE\n11\n13\n", contact=CONTACT.replace("UNDER", "POINTS")), r"line \d+: \*SURFACE POINTS has node 11, which belongs to no facet"),
+    "a surface of nodes that others face": (deck(mesh=MESH + "*SURFACE, NAME=POINTS, TYPE=NODE\n4\n6\n", contact=CONTACT.replace("UNDER, ON", "UNDER, POINTS")), r"line \d+: \*SURFACE POINTS has node 4, which belongs to no facet whose nodes are all in it; expected the nodes of whole facets"),
     "a surface of nodes and of faces": (deck(mesh=MESH + "*SURFACE, NAME=UNDER, TYPE=NODE\n11\n"), r"line \d+: \*SURFACE gives UNDER as nodes and as faces, also in model.inp line \d+"),
     "a surface of faces and of nodes": (deck(mesh=MESH + "*SURFACE, NAME=P, TYPE=NODE\n11\n*SURFACE, NAME=P\n11, S1\n"), r"line \d+: \*SURFACE gives P as nodes and as faces"),
     "a surface of nodes of no body": (deck(mesh=MESH + "*NODE\n99, 9., 9.\n*SURFACE, NAME=POINTS, TYPE=NODE\n99\n", contact=CONTACT.replace("UNDER", "POINTS")), r"line \d+: \*SURFACE POINTS has no node of a body"),

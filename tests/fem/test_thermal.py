@@ -57,6 +57,43 @@ def test_a_bar_between_walls():
     assert np.isclose(root.lambda_n.sum(), E * FREE / (1 - 2 * NU), rtol=1e-8)
 
 
+def test_a_temperature_that_grows_with_alpha(tmp_path):
+    """The bar between walls, from a file, too: the last entry of u is alpha."""
+    mesh = grid(4, 1, 4, length=2.0)
+    options = {**STEEL, "plane": "stress", "symmetry": ["left", "bottom"], "contact": "right", "gap": 0.03}
+    problem = fem.mesh_problem(mesh, **options, temperature=WARM / 4, temperature_slope=WARM)
+    write_problem(problem, tmp_path / "bar.npz")
+    for body, alpha in ((problem, 0.5), (problem, 2.0), (read_problem(tmp_path / "bar.npz"), 1.0)):
+        root = enumsol.enumerate_roots(body, alpha)[0]
+        pressed = E * max((0.25 + alpha) * FREE - 0.03 / 2.0, 0.0)
+        assert np.isclose(root.lambda_n.sum(), pressed, rtol=1e-10)
+        assert np.isclose(root.u[-1], alpha)
+        assert np.allclose(fem.cell_stresses(body, root.u)[:, 0, 0], -pressed)
+    assert "temperature_slope 40" in str(fem.mesh_scene(mesh, **options, temperature_slope=WARM))
+    graph = enumsol.branch_graph(problem, (0, 2))
+    graph.save(tmp_path / "graph.json")
+    assert np.array_equal(
+        enumsol.BranchGraph.load(tmp_path / "graph.json").problem.mesh.stress_slope, problem.mesh.stress_slope
+    )
+
+
+def test_a_history_of_warming_is_that_of_its_alphas():
+    """Steps by the temperature and steps by its slope have the same loads but for alpha itself, and the same roots."""
+    mesh = grid(4, 1, 4, length=2.0)
+    options = {**STEEL, "plane": "stress", "symmetry": ["left", "bottom"], "contact": "right", "gap": 0.03}
+    cold = fem.mesh_scene(mesh, **options)
+    warm = fem.mesh_problem(mesh, **options, temperature_slope=WARM)
+    by_steps = fem.scene_steps(cold, [{"temperature": WARM / 2}, {"temperature": WARM}])
+    by_alpha = enumsol.histories(warm, ["1/2", 1])
+    for step, alpha in zip(by_steps, (0.5, 1.0), strict=True):
+        assert np.allclose(step.load, warm.load_at(alpha)[:-1], atol=1e-15)
+    found = enumsol.histories(cold.problem(), by_steps)
+    assert found.complete
+    assert by_alpha.complete
+    for node in [(1, 0), (2, 0)]:
+        assert np.allclose(found.root(node).u, by_alpha.root(node).u[:-1])
+
+
 def test_a_linear_temperature_bends_a_free_body_without_stress():
     mesh = solid((2, 2, 2), 27)
     x, y, z = mesh.points.T

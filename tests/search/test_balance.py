@@ -2,19 +2,23 @@
 
 import sys
 from fractions import Fraction
+from functools import partial
 from pathlib import Path
 
 import numpy as np
+import pytest
 from floating_oracle import block_on_table
+from scipy.optimize import linprog
 
 import enumsol
-from enumsol.model.statuses import UNDECIDED
+from enumsol.model.statuses import SLIP_MINUS, SLIP_PLUS, STICK, UNDECIDED
 from enumsol.search.certifiers.exclusions import in_balance
+from enumsol.search.reference_closer import Cover
 from enumsol.search.solvers import Solvers
 from enumsol.trusted.status_rows import FORBIDDEN, NONNEGATIVE, row_signs
 
 sys.path.insert(0, str(Path(__file__).parents[2] / "studies"))
-from contact_alone.bodies import pin, telescope
+from contact_alone.bodies import pin, stack, telescope
 
 
 def test_multipliers_are_brought_into_balance_with_signs_that_are_allowed():
@@ -45,3 +49,21 @@ def test_a_pin_that_nothing_but_contact_holds_has_one_solution():
     roots = enumsol.enumerate_roots(problem, 0, max_nodes=600)
     assert len(roots) == 1
     assert roots.complete
+
+
+@pytest.mark.parametrize(
+    ("made", "led"),
+    [(partial(stack, 1), True), (partial(telescope, 12), False), (partial(pin, 24, 0.5, half=False), False)],
+)
+def test_a_tree_is_led_only_where_forces_elsewhere_cannot_hold_the_body(made, led):
+    """A linear program judges: what sticks at the root, or slips as fewer nodes do, is open or slips as these do."""
+    solvers = Solvers(made(), Fraction(0), "verified", 1e-9)
+    system, root = solvers.exclusions.system, np.array(solvers.known_root)
+    side = 1.0 if np.count_nonzero(root == SLIP_PLUS) < np.count_nonzero(root == SLIP_MINUS) else -1.0
+    fewer = SLIP_PLUS if side > 0 else SLIP_MINUS
+    G, p = system.rows.G.mid, system.p
+    rays = [G[:, i] + side * system.F[i] * G[:, p + i] for i in range(p)]
+    rays += [G[:, i] - side * system.F[i] * G[:, p + i] for i in np.flatnonzero((root != STICK) & (root != fewer))]
+    forces = linprog(np.zeros(len(rays)), A_eq=np.array(rays).T, b_eq=system.rows.h.mid)
+    assert forces.status == (2 if led else 0)
+    assert Cover([solvers.exclusions.reference(tuple(root.tolist()))]).is_whole == led

@@ -44,7 +44,7 @@ def coarser(rng, codes, F):
 
 def products_of(rng, reference, codes):
     """Some products of rows that are tight."""
-    forward, backward = rows_of(reference, codes)[1:]
+    forward, backward = rows_of([reference], codes)[1:]
     signs, own = (row_signs(np.array(given), reference.system.F) for given in (codes, reference.selection))
     closing = np.flatnonzero((signs[:, 4] > FORBIDDEN) & (own[:, 4] > 1))
     rows = [*forward, *backward, *(4 * len(codes) + closing).tolist()]
@@ -68,7 +68,7 @@ def test_what_leaves_no_other_root_has_none(seed):
             codes = others[k % len(others)] if others and k % 2 else final[rng.integers(len(final))]
             codes = coarser(rng, codes, F)
             shared = any(all(map(refines, other, codes)) for other in others)
-            rows, best = rows_of(reference, codes)[0], proposed(reference, codes)
+            rows, best = rows_of([reference], codes)[0], proposed([reference], codes)
             tried = [(rows, []), (rows[1:], []), (rows, products_of(rng, reference, codes)), (best.rows, best.products)]
             found = [reference.is_only_root(codes, *given, exclusions.system.reach) for given in tried]
             assert not (shared and any(found))
@@ -86,7 +86,7 @@ def test_rows_that_are_none_of_an_assignment(seed):
     assert np.all(exclusions.system.F > 0)
     allowed, refused = np.zeros((2, 2), dtype=int)
     for codes in product((1, 2, 3, 5), (2, 3, 5, 6, 7), *[(6, 8)] * (p - 2)):
-        rows, best = rows_of(reference, codes)[0], proposed(reference, codes).products
+        rows, best = rows_of([reference], codes)[0], proposed([reference], codes).products
         if not reference.is_only_root(codes, rows, best, reach):
             continue
         for row in range(-1, 7 * p + 1):

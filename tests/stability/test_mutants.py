@@ -132,6 +132,23 @@ def test_forged_weights():
     assert not leaf(1, stays=(1,)).holds(stiffness, motions)
 
 
+@pytest.mark.parametrize("high", [1.0, np.inf])
+def test_slopes_that_overflow_prove_nothing(high):
+    """A slope of K between two ends that are as near as floats can be."""
+    stiffness, motions = one_node(0.5)
+    assert leaf(1, low=0.5, high=high, beside=0.0).holds(stiffness, motions)
+    assert not leaf(1, low=5e-324, high=high, beside=0.0).holds(stiffness, motions)
+
+
+@pytest.mark.parametrize("value", [0.0, np.nan])
+def test_no_form_is_definite_in_a_component_that_moves_nothing(value):
+    stiffness, motions = one_node(0.5)
+    none = Ball.exact(np.full((2, 1), value))
+    for more in ({"high": 1.0}, {"low": 1.0, "high": np.inf, "beside": 0.0}):
+        assert leaf(1, **more).holds(stiffness, motions)
+        assert not leaf(1, **more).holds(stiffness, Motions(none, none, motions.signed))
+
+
 def test_ranges_that_leave_something_out():
     one = leaf(2, slides=(0,)), leaf(2, stays=(0,), slides=(1,)), leaf(2, stays=(0, 1))
     assert covers(one)

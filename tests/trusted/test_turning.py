@@ -11,6 +11,7 @@ from enumsol.condensation.space_condensed import EnclosedSpace, SpaceSystem
 from enumsol.model.sectors import SECTORS
 from enumsol.trusted.space.leaf_equations import Leaf
 from enumsol.trusted.space.sector_rows import OPEN, STICK
+from enumsol.trusted.space.turning import sums_of_both
 
 
 def exact(value):
@@ -141,3 +142,20 @@ def test_weak_springs_widen_nothing():
         state = leaf.over(np.zeros(2), leaf.half)
         wide.append([np.max(ball.rad) / np.max(np.abs(ball.mid)) for ball in state[:4]])
     assert np.allclose(wide, wide[0], rtol=0.02)
+
+
+@pytest.mark.parametrize("decades", [3, 300])
+def test_sums_over_all_other_angles_are_bounded(decades):
+    """Also where products of two numbers underflow and those of three do not."""
+    rng = np.random.default_rng(decades)
+    for _ in range(100):
+        k, q = (int(number) for number in rng.integers(1, 5, size=2))
+        left, right, radius = (10.0 ** rng.uniform(-decades, decades, size) for size in ((k, q), (q, q), q))
+        with np.errstate(over="ignore", invalid="ignore"):
+            bounds = sums_of_both(left, right, radius)
+        L, R, r = (np.vectorize(Fraction, otypes=[object])(part) for part in (left, right, radius))
+        for i, j in np.argwhere(np.isfinite(bounds)):
+            others = [n for n in range(q) if n != j]
+            true = sum(((L[i, n] * R[n, j] + L[i, j] * R[j, n]) * r[n] for n in others), Fraction(0))
+            assert true <= Fraction(bounds[i, j])
+            assert decades > 3 or bounds[i, j] <= float(true) * (1 + 1e-9) + 1e-250

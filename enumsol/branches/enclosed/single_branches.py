@@ -114,7 +114,7 @@ class _Proposed:
 
     @property
     def closed(self) -> ClosedPiece:
-        """What is kept of it."""
+        """The part that is kept of it."""
         return ClosedPiece(self.numbers, [codes for codes, _, _ in self.spans], self.leaves, self.bounded)
 
 

@@ -235,7 +235,7 @@ class Leaf:
         return w, np.asarray((beside + own.size * radius[:q]) * SAFE + TINY)
 
     def second(self, Y: Floats, over: tuple[State, State], angle: Floats, radius: Floats) -> tuple[Floats, Floats]:
-        """How much Y times the derivatives by all n unknowns and s differ over a box and over a piece, (n, n + 1) each.
+        """Bounds of how Y times the derivatives by n unknowns and s differ, over a box and a piece, (n, n + 1) each.
 
         The first bounds sums over the unknowns k of the sizes of Y times the second derivatives times ``radius``, the
         second is the size of those by s.

@@ -394,7 +394,8 @@ def held_by(matrix: Ball, SE: Ball, load: Ball, rows: Sequence[int]) -> tuple[Ba
 def sums_of_both(left: Floats, right: Floats, radius: Floats) -> Floats:
     """Bounds of the sums over all k but j of (left_ik right_kj + left_ij right_jk) radius_k, of nonnegative floats."""
     others = right * (1.0 - np.eye(len(right)))
-    sums = (left * radius) @ others + left * (others @ radius)
+    # what underflows in one product may be large in the next
+    sums = (left * radius + TINY) @ others + left * (others @ radius + TINY)
     return np.asarray(sums * (1.0 + gamma(2 * len(right) + 8)) * SAFE + TINY)
 
 
