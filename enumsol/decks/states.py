@@ -180,7 +180,8 @@ def _check_face(deck: Deck, rows: Integers, act: Act) -> None:
     for first, block, own in by_block(deck.blocks, rows):
         faces = len(block.type.shape.faces)
         if not 1 <= int(act.label[1:]) <= faces:
+            has = f"has {faces} faces; expected one of these" if faces else "is no body; expected elements of bodies"
             raise InvalidArgumentError(
                 f"{act.place}: *DLOAD loads {act.label} of element {deck.element_name(first + int(own[0]))} of type "
-                f"{block.type.name}, which has {faces} faces; expected one of these"
+                f"{block.type.name}, which {has}"
             )

@@ -144,6 +144,7 @@ WRONG = {
     "rotation about a long axis": (deck(steps=step("*DLOAD\nUPPER, CENTRIF, 0.5, 1., 2., 0., 0., 0., 2.\n")), r"line \d+: \*DLOAD has CENTRIF with a direction of length 2"),
     "rotation about two axes": (deck(steps=step("*DLOAD\nUPPER, CENTRIF, 0.5, 1., 2., 0., 0., 0., 1.\n11, CENTRIF, 0.5, 1., 0., 0., 0., 0., 1.\n")), r"line \d+: \*DLOAD has CENTRIF on element 11, as model.inp line \d+ has already; expected one axis"),
     "rotation without density": (deck(materials=MATERIALS.replace("*DENSITY\n2.\n", ""), steps=step("*DLOAD\nUPPER, CENTRIF, 0.5, 1., 2., 0., 0., 0., 1.\n")), r"line \d+: \*DLOAD has CENTRIF on elements of SOFT, which has no \*DENSITY"),
+    "a pressure on a beam": (deck(mesh=MESH + "*ELEMENT, TYPE=B31, ELSET=BEAMS\n90, 4, 5\n", steps=step("*DLOAD\n90, P1, 2.\n")), r"line \d+: \*DLOAD loads P1 of element 90 of type B31, which is no body; expected elements of bodies"),
     "gravity without density": (deck(materials=MATERIALS.replace("*DENSITY\n2.\n", ""), steps=step("*DLOAD\nUPPER, GRAV, 9.81, 0., -1., 0.\n")), r"line \d+: \*DLOAD has GRAV on elements of SOFT, which has no \*DENSITY"),
     "a surface that is none": (deck(steps=step("*DSLOAD\nRIGTH, P, 1.\n")), r"line \d+: there is no surface of faces RIGTH"),
     "a traction": (deck(steps=step("*DSLOAD\nRIGHT, TRVEC, 1., 1., 0.\n")), r"line \d+: \*DSLOAD has the load TRVEC"),
@@ -212,6 +213,14 @@ def test_what_is_ignored_is_said(read):
     assert_same(model.problem(), by_hand(density=None))
     assert "*PLASTIC              not used, as you say" in str(model)
     assert "NLGEOM is ignored: displacements are small" in str(model)
+
+
+def test_a_load_on_elements_that_are_ignored_is_refused_with_their_line(read):
+    beams = "*ELEMENT, TYPE=B31, ELSET=BEAMS\n90, 4, 5\n"
+    text = deck(mesh=MESH + beams, steps=step("*DLOAD\n90, P1, 2.\n"))
+    words = r"element '90' is not in the deck, whose elements of model.inp line 39 are left out; expected a number"
+    with pytest.raises(enumsol.InvalidProblemError, match=words):
+        read(text, ignore=["B31"])
 
 
 def test_the_step_of_an_analysis_that_is_ignored_is_left_out_as_a_whole(read):
