@@ -178,6 +178,8 @@ MESH_OPTIONS = {
     "pressure_slope": Given(_LOAD, "NAME=P", _number),
     "body_force": Given(_LOAD, "[NAME=]fx,fy[,fz]", _numbers),
     "body_force_slope": Given(_LOAD, "[NAME=]fx,fy[,fz]", _numbers),
+    "centrifugal": Given(_LOAD, "NAME=c,x,y,z,ax,ay,az", _numbers),
+    "centrifugal_slope": Given(_LOAD, "NAME=c,x,y,z,ax,ay,az", _numbers),
     "force": Given(_LOAD, _PULL, _numbers),
     "force_slope": Given(_LOAD, _PULL, _numbers),
     "moment": Given(_LOAD, "NAME=M[,My,Mz]", _number_or_numbers),
@@ -270,6 +272,8 @@ def solve(
     pressure_slope : The same, times alpha.
     body_force : Force per volume, such as the weight, by parts of the body.
     body_force_slope : The same, times alpha.
+    centrifugal : Density times speed squared of a part of the body that turns, a point on the axis, and its direction.
+    centrifugal_slope : The same, times alpha.
     force : Force on each node of a part or set of nodes, in 2D of the whole thickness.
     force_slope : The same, times alpha.
     moment : Moment on a reference point.

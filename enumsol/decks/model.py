@@ -393,8 +393,10 @@ class Deck:
         if not len(rows):
             known = listed(sets) or "none"
             found = "is empty or not" if key(name) in sets else "is not"
+            out = [str(own.place) for own in self.account if own.card == what.upper() and not own.used]
+            without = f", whose elements of {' and '.join(out)} are left out" if out else ""
             raise InvalidArgumentError(
-                f"{place}: {what} {shown(name)} {found} in the deck; expected a number or a set of {known}"
+                f"{place}: {what} {shown(name)} {found} in the deck{without}; expected a number or a set of {known}"
             )
         return rows
 

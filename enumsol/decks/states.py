@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from enumsol.decks.model import by_block
+from enumsol.decks.steps import FIELDS
 from enumsol.errors import InvalidArgumentError
 
 if TYPE_CHECKING:
@@ -25,6 +26,8 @@ Key = tuple[str, int | str, int | str]
 
 #: Length of a direction may differ from one by this, by rounding of its components in the deck.
 _ROUNDED = 1e-3
+#: What else than before a field may be given to a set.
+_OTHER_FIELDS = {"GRAV": "gravity in another direction", "CENTRIF": "CENTRIF about another axis"}
 
 
 @dataclass
@@ -35,7 +38,8 @@ class DeckState:
     ----------
     values : dict of Key to float
         Displacements ("BOUNDARY", node, component), forces ("CLOAD", node, component), loads on elements ("DLOAD",
-        element, label), gravity ("GRAV", set, direction) and temperatures ("TEMPERATURE", node, 0).
+        element, label), fields ("GRAV", set, direction) or ("CENTRIF", set, axis), and temperatures ("TEMPERATURE",
+        node, 0).
     places : dict of Key to DeckPlace
         The line that gave each.
     """
@@ -109,15 +113,15 @@ class _Acting:
         if key in given and key[0] == "CLOAD":
             self._terms[key].append(term)
             return
-        if key in given and key[0] in ("BOUNDARY", "DLOAD", "GRAV") and self._terms[key] != [term]:
+        if key in given and key[0] in ("BOUNDARY", "DLOAD", *FIELDS) and self._terms[key] != [term]:
             raise InvalidArgumentError(
                 f"{act.place}: *{act.card} gives {self._named(key)} the value {term[0]:g}, and {given[key]} gives it "
                 f"{self._terms[key][0][0]:g} in the same step; expected one value"
             )
         others = (own for own in self._terms if own[:2] == key[:2] and own != key and own not in given)
-        if key[0] == "GRAV" and (before := next(others, None)) is not None:
+        if key[0] in FIELDS and (before := next(others, None)) is not None:
             raise InvalidArgumentError(
-                f"{act.place}: *DLOAD gives {key[1]} gravity in another direction than {self._places[before]}, to "
+                f"{act.place}: *DLOAD gives {key[1]} {_OTHER_FIELDS[key[0]]} than {self._places[before]}, to "
                 "which programs add it or not; expected OP=NEW"
             )
         self._terms[key], self._places[key], given[key] = [term], act.place, act.place
@@ -141,7 +145,7 @@ class _Acting:
         kind, of, what = key
         if kind in ("BOUNDARY", "CLOAD"):
             return f"component {what} of node {self._deck.node_name(int(of))}"
-        return f"gravity of {of}" if kind == "GRAV" else f"{what} of element {self._deck.element_name(int(of))}"
+        return f"{kind} of {of}" if kind in FIELDS else f"{what} of element {self._deck.element_name(int(of))}"
 
 
 def _given_to(deck: Deck, act: Act) -> list[tuple[Key, float]]:
@@ -152,14 +156,14 @@ def _given_to(deck: Deck, act: Act) -> list[tuple[Key, float]]:
     if act.card in ("TEMPERATURE", "INITIAL CONDITIONS"):
         rows = deck.nodes_of(act.target, act.place).tolist()
         return [((act.card, row, 0), act.values[0]) for row in rows]
-    if act.label == "GRAV":
-        length = float(np.linalg.norm(act.values[1:]))
+    if act.label in FIELDS:
+        length = float(np.linalg.norm(act.values[-3:]))
         if abs(length - 1.0) > _ROUNDED:
             raise InvalidArgumentError(
-                f"{act.place}: *DLOAD has GRAV with a direction of length {length:g}, which programs read differently; "
-                "expected length one"
+                f"{act.place}: *DLOAD has {act.label} with a direction of length {length:g}, which programs read "
+                "differently; expected length one"
             )
-        return [(("GRAV", act.target, " ".join(map(repr, act.values[1:]))), act.values[0])]
+        return [((act.label, act.target, " ".join(map(repr, act.values[1:]))), act.values[0])]
     if act.card == "DSLOAD":
         if act.target not in deck.surfaces or deck.surfaces[act.target].nodes is not None:
             raise InvalidArgumentError(f"{act.place}: there is no surface of faces {act.target}; expected *SURFACE")
@@ -176,7 +180,8 @@ def _check_face(deck: Deck, rows: Integers, act: Act) -> None:
     for first, block, own in by_block(deck.blocks, rows):
         faces = len(block.type.shape.faces)
         if not 1 <= int(act.label[1:]) <= faces:
+            has = f"has {faces} faces; expected one of these" if faces else "is no body; expected elements of bodies"
             raise InvalidArgumentError(
                 f"{act.place}: *DLOAD loads {act.label} of element {deck.element_name(first + int(own[0]))} of type "
-                f"{block.type.name}, which has {faces} faces; expected one of these"
+                f"{block.type.name}, which {has}"
             )

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 from enumsol.decks.cards import is_number, key
 from enumsol.decks.contact_cards import pair_named
 from enumsol.decks.registry import card, compact, harmless, refused
-from enumsol.decks.steps import Act, Amplitude, DeckStep
+from enumsol.decks.steps import FIELDS, Act, Amplitude, DeckStep
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -166,20 +166,22 @@ def cload(reading: Reading, given: Card) -> str:
 @card("DLOAD", "OP", "AMPLITUDE", "FOLLOWER", *_OTHER, unused=("CONSTANT RESULTANT",))
 @card("DSLOAD", "OP", "AMPLITUDE", "FOLLOWER", *_OTHER, unused=("CONSTANT RESULTANT",))
 def dload(reading: Reading, given: Card) -> str:
-    """*DLOAD and *DSLOAD: pressures on faces of elements or on surfaces, forces per volume and gravity."""
+    """*DLOAD and *DSLOAD: pressures on faces of elements or on surfaces, forces per volume, gravity and rotation."""
     _without_following(given)
     acts = []
     for row, entries in given.rows():
         label = key(entries[1]) if len(entries) > 1 else ""
         of_face = label[:1] == "P" and (label[1:].isdigit() if given.name == "DLOAD" else label == "P")
-        if label == "GRAV" and given.name == "DLOAD":
-            values = tuple(given.number(entry, row) for entry in (*entries[2:6], "", "", "", "")[:4])
-            if not any(values[1:]):
-                raise given.refused("has GRAV without a direction; expected an acceleration and three numbers", row)
+        if label in FIELDS and given.name == "DLOAD":
+            count = FIELDS[label]
+            values = tuple(given.number(entry, row) for entry in (*entries[2:], *[""] * count)[:count])
+            if not any(values[-3:]):
+                size = "an acceleration" if label == "GRAV" else "the speed squared, a point on the axis"
+                raise given.refused(f"has {label} without a direction; expected {size} and three numbers", row)
         elif of_face or (label in VOLUME and given.name == "DLOAD"):
             values = (_last(given, row, entries, 2),)
         else:
-            expected = "P1, P2, ..., GRAV, BX, BY or BZ" if given.name == "DLOAD" else "P, a pressure"
+            expected = "P1, P2, ..., GRAV, CENTRIF, BX, BY or BZ" if given.name == "DLOAD" else "P, a pressure"
             raise given.refused(f"has the load {label or 'without a label'}; expected {expected}", row)
         acts.append(_act(given, row, entries, label, (), values))
     return _given(reading, given, "DLOAD", acts)
@@ -242,7 +244,7 @@ def _act(
 ) -> Act:
     """Act of one line."""
     named = entries[0] if entries else ""
-    if not named and label != "GRAV":  # which acts on all elements then
+    if not named and label not in FIELDS:  # which acts on all elements then
         raise given.refused("has a line without a node, an element or a set; expected one of them", row)
     target = named if is_number(named) else key(named)
     return Act(given.name, given.at(row), target, label, components, values, given.name_of("AMPLITUDE") or None)

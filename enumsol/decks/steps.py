@@ -9,6 +9,9 @@ import numpy as np
 
 from enumsol.decks.cards import DeckPlace
 
+#: Loads by the mass of elements, and how many numbers each has: a size, of CENTRIF a point on the axis, a direction.
+FIELDS = {"GRAV": 4, "CENTRIF": 7}
+
 
 @dataclass(frozen=True)
 class Act:
@@ -26,7 +29,7 @@ class Act:
     components : tuple of int
         Components of the nodes, from 1; 4 to 6 are rotations.
     values : tuple of float
-        Reference values: one, or that of gravity with its direction.
+        Reference values: one, or those of a field (`FIELDS`).
     amplitude : str or None
     """
 

@@ -304,12 +304,16 @@ class NodalBasis:
             signs[block.rows] = np.sign(np.linalg.det(block.jacobians[:, 0]))
         return signs
 
-    def volume_forces(self, density: Floats) -> Floats:
-        """Nodal forces (N, d) of a force per volume that is constant on each cell, (M, d)."""
+    def volume_forces(self, density: Floats, slopes: Floats | None = None) -> Floats:
+        """Nodal forces (N, d) of a force per volume on each cell: constant, (M, d), plus (M, d, d) times the place."""
         total = np.zeros(self.shape)
         for block in self.blocks:
             shares = self.weights(block) @ block.values.T
             np.add.at(total, block.nodes, shares[:, :, None] * density[block.rows, None])
+            if slopes is not None:
+                fine = replace(block, degree=block.degree + 2)
+                forces = np.einsum("mij,mqj->mqi", slopes[block.rows], fine.places) * self.weights(fine)[:, :, None]
+                np.add.at(total, block.nodes, np.einsum("aq,mqi->mai", fine.values, forces))
         return total
 
     def stressed(self, moduli: Floats, nodes: Floats, cells: Floats) -> tuple[Floats, Floats]:

@@ -79,6 +79,8 @@ class Options:
     pressure_slope: Mapping[str, float] | None
     body_force: ArrayLike | Mapping[str, ArrayLike] | None
     body_force_slope: ArrayLike | Mapping[str, ArrayLike] | None
+    centrifugal: Mapping[str, ArrayLike] | None
+    centrifugal_slope: Mapping[str, ArrayLike] | None
     force: Vectors
     force_slope: Vectors
     moment: Mapping[str, Any] | None
@@ -162,6 +164,8 @@ def _in_python(option: str, part: str, number: str) -> str:
     return f'{option}={{"{part}": {number}}}' if part else f"{option}={number}"
 
 
+#: Components of a centrifugal force below this part of its numbers are rounding.
+_ROUNDING = 1e-9
 #: What stands for a component that is not given.
 FREE = "free"
 #: Numbers that an obstacle takes in 2D and 3D: a point and a normal, or a centre and a radius.
@@ -393,6 +397,10 @@ def nodal_forces(body: NodalBasis, mesh: PartedMesh, options: Options, slope: st
     total = part_forces(body, mesh, loads, pressures, slope)
     if volume is not None:
         total += body.volume_forces(body_force_of(mesh, volume, f"body_force{slope}"))
+    turning = getattr(options, f"centrifugal{slope}")
+    if turning is not None:
+        density, slopes = centrifugal_of(mesh, turning, f"centrifugal{slope}", axisymmetric=body.axisymmetric)
+        total += body.volume_forces(density, slopes)
     points, axes = by_part(options.reference, "reference"), frames_of(mesh, options.transform).axes
     for part, value in by_part(forces, f"force{slope}").items():
         if part not in points:
@@ -416,6 +424,39 @@ def body_force_of(mesh: PartedMesh, value: object, name: str) -> Floats:
     for part, force in by_part(value, name).items():
         density[mesh.body(part)] += short_vector(force, f"{name} of {part}", dimension)
     return density
+
+
+def centrifugal_of(mesh: PartedMesh, value: object, name: str, *, axisymmetric: bool = False) -> tuple[Floats, Floats]:
+    """Force per volume c (1 - a a') (x - x0) of parts that turn about an axis, as its value at 0 and its derivative.
+
+    By cells, (M, d) and (M, d, d) [force / length^3, force / length^4]; c is density times speed squared.
+
+    Raises
+    ------
+    InvalidArgumentError
+        A part does not exist or has not seven numbers, the axis has no direction, or the force leaves the plane or is
+        not that of an axisymmetric body.
+    """
+    d = mesh.points.shape[1]
+    constant, slopes = np.zeros((len(mesh.cells), d)), np.zeros((len(mesh.cells), d, d))
+    for part, given in by_part(value, name).items():
+        own = f"{name} of {part}"
+        numbers = short_vector(given, own, 7)
+        if not np.any(numbers[4:]):
+            raise InvalidArgumentError(f"{own} has an axis without a direction; expected one, the last three numbers")
+        (axis,) = unit_vectors(numbers[None, 4:], own)
+        slope = numbers[0] * (np.eye(3) - np.outer(axis, axis))
+        at_origin = -slope @ numbers[1:4]
+        across = max(np.max(np.abs(slope[d:, :d]), initial=0.0), np.max(np.abs(at_origin[d:]), initial=0.0))
+        if axisymmetric:
+            across = max(across, np.max(np.abs(slope[:d, 1])), np.max(np.abs(at_origin)))
+        if across > _ROUNDING * np.max(np.abs(numbers)):
+            expected = "the y axis of an axisymmetric body" if axisymmetric else "one across the plane, or within it"
+            raise InvalidArgumentError(f"{own} has the axis {shown(numbers[1:].tolist())}; expected {expected}")
+        rows = mesh.body(part)
+        constant[rows] += at_origin[:d]
+        slopes[rows] += slope[:d, :d]
+    return constant, slopes
 
 
 def part_forces(body: NodalBasis, mesh: PartedMesh, loads: object, pressures: object, slope: str = "") -> Floats:

@@ -12,6 +12,8 @@ import numpy as np
 from enumsol.errors import InvalidArgumentError
 
 if TYPE_CHECKING:
+    from collections.abc import Iterator
+
     from enumsol.decks.cards import DeckPlace
     from enumsol.decks.model import Deck, Material, Section
     from enumsol.decks.states import DeckState
@@ -277,6 +279,7 @@ def acting(deck: Deck, parts: DeckParts, state: DeckState, joints: DeckJoints) -
         "moment": moments,
         "pressure": _pressures(deck, parts, state),
         "body_force": _volume_forces(deck, parts, state),
+        "centrifugal": _centrifugal(deck, parts, state),
         "temperature": _temperatures(deck, parts, state),
     }
     return {name: value for name, value in options.items() if value}
@@ -369,19 +372,9 @@ def _volume_forces(deck: Deck, parts: DeckParts, state: DeckState) -> dict[str, 
     """Forces per volume by sets of elements: gravity by the density of each material, and those that are given."""
     dimension = 2 if is_plane(deck) else 3
     total: dict[int, Floats] = {}
-    for (target, direction), value in state.of("GRAV").items():
-        place = state.places["GRAV", target, direction]
-        wanted = deck.elements_of(str(target), place) if target else np.arange(len(deck.element_labels))
-        axis = np.array([float(part) for part in str(direction).split()])
-        for section, rows in elastic_sections(deck):
-            density = deck.materials[section.material].density
-            own = np.intersect1d(rows, wanted)
-            if len(own) and density is None:
-                raise InvalidArgumentError(
-                    f"{place}: *DLOAD has GRAV on elements of {section.material}, which has no *DENSITY; expected one"
-                )
-            for row in own.tolist():
-                total[row] = total.get(row, np.zeros(3)) + value * (density or 0.0) * axis
+    for _, axis, weight, rows in _by_mass(deck, state, "GRAV"):
+        for row in rows:
+            total[row] = total.get(row, np.zeros(3)) + weight * axis
     for (element, label), value in state.of("DLOAD").items():
         if str(label).startswith("B"):
             total[int(element)] = total.get(int(element), np.zeros(3)) + value * np.eye(3)["XYZ".index(str(label)[1])]
@@ -393,4 +386,43 @@ def _volume_forces(deck: Deck, parts: DeckParts, state: DeckState) -> dict[str, 
         if any(vector[dimension:]):
             raise InvalidArgumentError(f"{deck.path}: a force per volume acts across the plane of plane elements")
         found[parts.elements(np.array(elements), "volume force")] = list(vector[:dimension])
+    return found
+
+
+def _by_mass(deck: Deck, state: DeckState, kind: str) -> Iterator[tuple[DeckPlace, Floats, float, list[int]]]:
+    """Lines of a load by mass, with the numbers of its field, its size times the density, and elements of a material.
+
+    Raises
+    ------
+    InvalidArgumentError
+        A material has no density.
+    """
+    for (target, field), value in state.of(kind).items():
+        place = state.places[kind, target, field]
+        wanted = deck.elements_of(str(target), place) if target else np.arange(len(deck.element_labels))
+        for section, rows in elastic_sections(deck):
+            density = deck.materials[section.material].density
+            own = np.intersect1d(rows, wanted)
+            if len(own) and density is None:
+                raise InvalidArgumentError(
+                    f"{place}: *DLOAD has {kind} on elements of {section.material}, which has no *DENSITY; expected one"
+                )
+            numbers = np.array([float(part) for part in str(field).split()])
+            yield place, numbers, value * (density or 0.0), own.tolist()
+
+
+def _centrifugal(deck: Deck, parts: DeckParts, state: DeckState) -> dict[str, list[float]]:
+    """Centrifugal forces by sets of elements: density times speed squared, a point on the axis, and its direction."""
+    found: dict[str, list[float]] = {}
+    turning: dict[int, DeckPlace] = {}
+    for place, axis, force, rows in _by_mass(deck, state, "CENTRIF"):
+        again = next((row for row in rows if row in turning), None)
+        if again is not None:
+            raise InvalidArgumentError(
+                f"{place}: *DLOAD has CENTRIF on element {deck.element_name(again)}, as {turning[again]} has already; "
+                "expected one axis for every element"
+            )
+        turning |= dict.fromkeys(rows, place)
+        if rows:
+            found[parts.elements(np.array(rows), "rotation")] = [force, *axis.tolist()]
     return found

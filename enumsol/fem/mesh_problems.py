@@ -151,6 +151,8 @@ def mesh_problem(
     pressure_slope: Mapping[str, float] | None = None,
     body_force: ArrayLike | Mapping[str, ArrayLike] | None = None,
     body_force_slope: ArrayLike | Mapping[str, ArrayLike] | None = None,
+    centrifugal: Mapping[str, ArrayLike] | None = None,
+    centrifugal_slope: Mapping[str, ArrayLike] | None = None,
     force: Vectors = None,
     force_slope: Vectors = None,
     moment: Mapping[str, Any] | None = None,
@@ -261,6 +263,11 @@ def mesh_problem(
     body_force, body_force_slope : vector, or mapping of names to vectors, optional
         Force per volume, such as the weight, on the whole body or on parts of it, and its derivative with respect to
         alpha [force / length^3].
+    centrifugal, centrifugal_slope : mapping of names of parts of the body to seven numbers, optional
+        Of parts that turn at a constant speed: density times speed squared (in radians per time), a point on the axis
+        and its direction, and its derivative with respect to alpha. At a distance r from the axis the force per volume
+        is the first of them times r [force / length^4]. Points and directions have three components in 2D as well; an
+        axisymmetric body turns about y.
     force, force_slope : mapping of names to vectors
         Force on each node of a part or set of nodes in x, y (and z), in 2D of the whole thickness, and its derivative
         with respect to alpha [force].
@@ -314,7 +321,8 @@ def mesh_problem(
         displacement_slope=displacement_slope, transform=transform, tie=tie, reference=reference, rigid=rigid,
         coupling=coupling, equations=equations, spring=spring, node_spring=node_spring,
         load=load, load_slope=load_slope, pressure=pressure, pressure_slope=pressure_slope, body_force=body_force,
-        body_force_slope=body_force_slope, force=force, force_slope=force_slope,
+        body_force_slope=body_force_slope, centrifugal=centrifugal,
+        centrifugal_slope=centrifugal_slope, force=force, force_slope=force_slope,
         moment=moment, moment_slope=moment_slope,
         gap=gap, obstacle=obstacle, max_rigid_displacement=max_rigid_displacement, groups=groups,
     )  # fmt: skip

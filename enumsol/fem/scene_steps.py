@@ -23,7 +23,11 @@ if TYPE_CHECKING:
 _LOADS = (
     "displacement",
     "temperature",
-    *(name + end for name in ("load", "pressure", "body_force", "force", "moment") for end in ("", "_slope")),
+    *(
+        name + end
+        for name in ("load", "pressure", "body_force", "centrifugal", "force", "moment")
+        for end in ("", "_slope")
+    ),
 )
 
 
@@ -39,8 +43,8 @@ def scene_steps(scene: Scene, steps: Iterable[Mapping[str, Any]]) -> list[LoadSt
     steps : sequence of mappings
         Any of ``alpha``; ``friction``, as in `LoadStep`, in 3D also as a pair along both axes, or by names of all
         contact parts; ``displacement`` of nodes without contact that the scene holds; and, as in `mesh_problem`,
-        ``temperature``, ``load``, ``pressure``, ``body_force``, ``force`` and ``moment``, the last five also with
-        ``_slope``.
+        ``temperature``, ``load``, ``pressure``, ``body_force``, ``centrifugal``, ``force`` and ``moment``, the last six
+        also with ``_slope``.
 
     Returns
     -------

@@ -9,7 +9,6 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from enumsol.arithmetic.balls import factor_above
 from enumsol.support.array_types import Floats, Indices, Mask
 from enumsol.support.deadlines import look
 
@@ -237,7 +236,6 @@ class Descent:
         self._side = np.where(chosen, np.sign(nodes.slip), 0.0)
         self._give = _SHARED * nodes.gap / np.where(self._side != 0, np.abs(nodes.slip), np.inf)
         self._H = 0.5 * (R + R.T)
-        self._L = np.linalg.cholesky(self._H)
 
     def numbers(self) -> Floats | None:
         """mu, kappa, nu, theta / F and tau as a proof has them, or None."""
@@ -277,33 +275,44 @@ class Descent:
         form[: len(mu)] = mu[:, None] * R[: len(mu)]
         form[n] -= rho[:, None] * R[t]
         form[t] = nu[:, None] * R[n] + kappa[:, None] * R[t]
+        form = 0.5 * (form + form.T)
         if self._spare is not None:
             strength = mu * self._spare[0]
             strength[n] += nu * self._spare[1]
-            form += R[: len(mu)].T @ (strength[:, None] * R[: len(mu)])
-        return 0.5 * (form + form.T)
+            # |nu F| <= mu: strengths are not negative but by rounding
+            root = np.sqrt(np.maximum(strength, 0.0))[:, None] * R[: len(mu)]
+            form += root.T @ root
+        return form
 
     def _least(self, z: Floats) -> float:
         """The smallest eigenvalue relative to H, and to the mean of mu and kappa."""
+        from scipy.linalg import eigh  # not for problems that need no numbers
+
         mu, kappa, nu, rho, _ = self._split(z)
-        half = np.linalg.solve(self._L, self._form(mu, kappa, nu, rho))
-        relative = np.linalg.solve(self._L, half.T)
-        return float(np.linalg.eigvalsh(0.5 * (relative + relative.T))[0] / np.mean(np.concatenate([mu, kappa])))
+        form = self._form(mu, kappa, nu, rho)
+        least = eigh(form, self._H, eigvals_only=True, subset_by_index=[0, 0], check_finite=False)[0]
+        return float(least / np.mean(np.concatenate([mu, kappa])))
 
     def _objective(self, z: Floats, weight: float) -> tuple[float, Floats]:
+        from scipy.linalg.lapack import dpotrf, dpotri, dtrtrs  # not for problems that need no numbers
+
         look()
         R, H, n, t, F = self._R, self._H, self._nodes.normal, self._nodes.tangential, self._nodes.F
         mu, kappa, nu, rho, side = self._split(z)
         mean, count = np.mean(np.concatenate([mu, kappa])), len(mu) + len(kappa)
-        M = self._form(mu, kappa, nu, rho) + weight * mean * H
-        L = factor_above(M)
-        if L is None:
+        # M is symmetric: its transpose is what LAPACK overwrites without a copy
+        L, fails = dpotrf((self._form(mu, kappa, nu, rho) + weight * mean * H).T, lower=1, clean=0, overwrite_a=1)
+        if fails:
             return _BEYOND, np.zeros_like(z)
-        P = np.linalg.inv(M)
+        log_det = 2.0 * float(np.sum(np.log(np.diag(L))))
+        if self._spare is not None:
+            half = dtrtrs(L, R[: len(mu)].T, lower=1)[0]
+            squares = np.sum(half * half, axis=0)
+        P = np.tril(dpotri(L, lower=1, overwrite_c=1)[0])
+        P += np.tril(P, -1).T
         # slopes of -log det M, which are -tr(P dM)
         by_mu, by_kappa, by_nu = (-np.sum(R[i] * P[j], axis=1) for i, j in ((slice(len(mu)),) * 2, (t, t), (n, t)))
         if self._spare is not None:
-            squares = np.sum((R[: len(mu)] @ P) * R[: len(mu)], axis=1)
             by_mu, by_nu = by_mu - self._spare[0] * squares, by_nu - self._spare[1] * squares[n]
         by_rho = np.sum(R[t] * P[n], axis=1)
         by_kappa += by_rho * np.where(side != 0, side * F, self._fixed)
@@ -313,7 +322,7 @@ class Descent:
         slope = np.concatenate([(by_mu + common) * mu, (by_kappa + common) * kappa, by_nu * mu[n] / F])
         slope[n] += by_nu * nu
         slope[self._nu] *= 1.0 - np.tanh(z[self._nu]) ** 2
-        return float(len(R) * np.log(mean) - 2.0 * np.sum(np.log(np.diag(L)))), slope
+        return float(len(R) * np.log(mean) - log_det), slope
 
     def _as_written(self, z: Floats) -> Floats:
         mu, kappa, nu, rho, _ = self._split(z)

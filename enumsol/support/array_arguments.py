@@ -237,7 +237,7 @@ def _check_sums(entries: Floats, row: NDArray[Any], column: NDArray[Any], name: 
 
 
 def short_vector(value: object, name: str, size: int) -> Floats:
-    """Value as a finite array of shape (1,), (2,), (3,), (6,) or (9,).
+    """Value as a finite array of shape (1,), (2,), (3,), (6,), (7,) or (9,).
 
     Raises
     ------
@@ -249,7 +249,7 @@ def short_vector(value: object, name: str, size: int) -> Floats:
     except InvalidArgumentError:
         array = np.empty(0)
     if array.shape != (size,):
-        expected = {1: "one", 2: "two", 3: "three", 6: "six", 9: "nine"}[size]
+        expected = {1: "one", 2: "two", 3: "three", 6: "six", 7: "seven", 9: "nine"}[size]
         numbers = "number" if size == 1 else "numbers"
         raise InvalidArgumentError(f"{name} is {shown(value)}; expected {expected} finite {numbers}")
     return array

@@ -155,8 +155,9 @@ def is_unbalanced(system: EnclosedSystem, codes: Sequence[int], z: Floats) -> bo
         size = z_abs @ (np.abs(G.mid) + G.rad)
         slack = (z_abs @ G.rad + k * size) * (1 + k) * SAFE
         normal, across, F = work[:p], work[p:], system.F
-        spread = slack[:p] + (F + system.F_rad) * slack[p:] + system.F_rad * np.abs(across)
-        spread += k * (np.abs(normal) + F * np.abs(across))
+        # F is below zero where it vanishes at an end of an interval that is rounded outward
+        spread = slack[:p] + (np.abs(F) + system.F_rad) * slack[p:] + system.F_rad * np.abs(across)
+        spread += k * (np.abs(normal) + np.abs(F * across))
         # what underflows is less, and nothing of it is left where all is zero
         spread = np.where(size[:p] + size[p:] > 0, spread * (1 + k) * SAFE + TINY, 0.0)
         most = np.stack([normal, normal + F * across, normal - F * across]) + spread

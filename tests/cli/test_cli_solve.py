@@ -221,21 +221,24 @@ def test_materials_and_friction_by_part_in_a_file_on_the_command_line_and_in_a_c
         "mesh = 'two.msh'\nyoung.pad = 5e3\nyoung.disc = 2e5\npoisson.pad = 0.45\npoisson.disc = 0.3\n"
         "thickness.pad = 2.0\nthickness.disc = 1.0\nplane = 'stress'\n"
         "friction.upper = 0.2\nfriction.floor = 0.1\nfriction_slope.floor = 0.5\n"
-        "gap.floor = 0.5\nbody_force.disc = [0, -1]\ncontact = 'floor'\ncontact_pair = [['upper', 'lower']]\n"
+        "gap.floor = 0.5\nbody_force.disc = [0, -1]\n"
+        "centrifugal.disc = [0.1, 0, 0, 0, 0, 0, 1]\ncontact = 'floor'\ncontact_pair = [['upper', 'lower']]\n"
         "clamp = 'roof'\nspring.lower = [1, 1]\n"
     )
     (two_bodies / "two.toml").write_text(text)
     command = (
         "solve two.msh --young pad=5e3 --young disc=2e5 --poisson pad=0.45 --poisson disc=0.3 --thickness pad=2 "
         "--thickness disc=1 --plane stress --friction upper=0.2 --friction floor=0.1 --friction-slope floor=0.5 "
-        "--gap floor=0.5 --body-force disc=0,-1 --contact floor --pair upper:lower --clamp roof --spring lower=1,1 "
+        "--gap floor=0.5 --body-force disc=0,-1 --centrifugal disc=0.1,0,0,0,0,0,1 "
+        "--contact floor --pair upper:lower --clamp roof --spring lower=1,1 "
         "-o two.npz"
     )
     printed(capsys, *command.split(), note="wrote a problem")
     direct = fem.mesh_problem(
         "two.msh", young={"pad": 5e3, "disc": 2e5}, poisson={"pad": 0.45, "disc": 0.3},
         thickness={"pad": 2, "disc": 1}, plane="stress", friction={"upper": 0.2, "floor": 0.1},
-        friction_slope={"floor": 0.5}, gap={"floor": 0.5}, body_force={"disc": (0, -1)}, contact="floor",
+        friction_slope={"floor": 0.5}, gap={"floor": 0.5}, body_force={"disc": (0, -1)},
+        centrifugal={"disc": (0.1, 0, 0, 0, 0, 0, 1)}, contact="floor",
         pairs=[("upper", "lower")], clamp="roof", spring={"lower": (1, 1)},
     )  # fmt: skip
     assert direct.friction.tolist() == [0.1, 0.1, 0.2, 0.2]

@@ -59,6 +59,9 @@ RIGHT = {
     "gravity of all": (deck(mesh=MESH + "*ELSET, ELSET=EVERY\nUPPER, LOWER\n", steps=step(DOWN + "*DLOAD\nEVERY, GRAV, 9.81, 1., 0., 0.\n")),
         {"pressure": None, "body_force": {"UPPER": (2 * 9.81, 0), "LOWER": (3 * 9.81, 0)}}),
     "gravity of all elements": (deck(steps=step(DOWN + "*DLOAD\n, GRAV, 9.81, 1., 0., 0.\n")), {"pressure": None, "body_force": {"UPPER": (2 * 9.81, 0), "LOWER": (3 * 9.81, 0)}}),
+    "rotation": (deck(steps=step(DOWN + "*DLOAD\nUPPER, Centrif, 0.5, 1., 2., 0., 0., 0., 1.\n12, P2, 2.\n")), {"centrifugal": {"UPPER": (2 * 0.5, 1, 2, 0, 0, 0, 1)}}),
+    "rotation of all elements about an axis in the plane": (deck(steps=step(DOWN + "*DLOAD\n, CENTRIF, 0.5, 1., 0., 0., 0., 1.\n")),
+        {"pressure": None, "centrifugal": {"UPPER": (2 * 0.5, 1, 0, 0, 0, 1, 0), "LOWER": (3 * 0.5, 1, 0, 0, 0, 1, 0)}}),
     "forces per volume": (deck(steps=step(DOWN + "*DLOAD\nUPPER, BX, 0.5\nUPPER, BY, -0.25\n12, P2, 2.\n")), {"body_force": {"UPPER": (0.5, -0.25)}}),
     "force per volume of an element": (deck(steps=step(DOWN + "*DLOAD\n12, BX, 0.5\n")), {"pressure": None, "body_force": {"LAST": (0.5, 0)}}),
     "an amplitude": (deck(materials="*AMPLITUDE, NAME=RISE\n0., 0., 0.5, 0.5,\n2., 2.\n" + MATERIALS,
@@ -137,6 +140,11 @@ WRONG = {
     "a pressure on nothing": (deck(steps=step("*DLOAD\n, P2, 1.\n")), r"line \d+: \*DLOAD has a line without a node, an element or a set"),
     "gravity without a direction": (deck(steps=step("*DLOAD\nUPPER, GRAV, 9.81\n")), r"line \d+: \*DLOAD has GRAV without a direction"),
     "gravity in a long direction": (deck(steps=step("*DLOAD\nUPPER, GRAV, 9.81, 0., -2., 0.\n")), r"line \d+: \*DLOAD has GRAV with a direction of length 2"),
+    "rotation about no axis": (deck(steps=step("*DLOAD\nUPPER, CENTRIF, 0.5, 1., 2., 0.\n")), r"line \d+: \*DLOAD has CENTRIF without a direction; expected the speed squared, a point on the axis and three numbers"),
+    "rotation about a long axis": (deck(steps=step("*DLOAD\nUPPER, CENTRIF, 0.5, 1., 2., 0., 0., 0., 2.\n")), r"line \d+: \*DLOAD has CENTRIF with a direction of length 2"),
+    "rotation about two axes": (deck(steps=step("*DLOAD\nUPPER, CENTRIF, 0.5, 1., 2., 0., 0., 0., 1.\n11, CENTRIF, 0.5, 1., 0., 0., 0., 0., 1.\n")), r"line \d+: \*DLOAD has CENTRIF on element 11, as model.inp line \d+ has already; expected one axis"),
+    "rotation without density": (deck(materials=MATERIALS.replace("*DENSITY\n2.\n", ""), steps=step("*DLOAD\nUPPER, CENTRIF, 0.5, 1., 2., 0., 0., 0., 1.\n")), r"line \d+: \*DLOAD has CENTRIF on elements of SOFT, which has no \*DENSITY"),
+    "a pressure on a beam": (deck(mesh=MESH + "*ELEMENT, TYPE=B31, ELSET=BEAMS\n90, 4, 5\n", steps=step("*DLOAD\n90, P1, 2.\n")), r"line \d+: \*DLOAD loads P1 of element 90 of type B31, which is no body; expected elements of bodies"),
     "gravity without density": (deck(materials=MATERIALS.replace("*DENSITY\n2.\n", ""), steps=step("*DLOAD\nUPPER, GRAV, 9.81, 0., -1., 0.\n")), r"line \d+: \*DLOAD has GRAV on elements of SOFT, which has no \*DENSITY"),
     "a surface that is none": (deck(steps=step("*DSLOAD\nRIGTH, P, 1.\n")), r"line \d+: there is no surface of faces RIGTH"),
     "a traction": (deck(steps=step("*DSLOAD\nRIGHT, TRVEC, 1., 1., 0.\n")), r"line \d+: \*DSLOAD has the load TRVEC"),
@@ -205,6 +213,14 @@ def test_what_is_ignored_is_said(read):
     assert_same(model.problem(), by_hand(density=None))
     assert "*PLASTIC              not used, as you say" in str(model)
     assert "NLGEOM is ignored: displacements are small" in str(model)
+
+
+def test_a_load_on_elements_that_are_ignored_is_refused_with_their_line(read):
+    beams = "*ELEMENT, TYPE=B31, ELSET=BEAMS\n90, 4, 5\n"
+    text = deck(mesh=MESH + beams, steps=step("*DLOAD\n90, P1, 2.\n"))
+    words = r"element '90' is not in the deck, whose elements of model.inp line 39 are left out; expected a number"
+    with pytest.raises(enumsol.InvalidProblemError, match=words):
+        read(text, ignore=["B31"])
 
 
 def test_the_step_of_an_analysis_that_is_ignored_is_left_out_as_a_whole(read):
