@@ -287,6 +287,8 @@ class GraphChecker(ProofChecker):
         elif batch[0][:1] == [_CLOSED]:
             if piece.closed is not None:
                 raise ValueError("it is decided by its arcs twice")
+            if len(piece.leaves("x")):  # of those before it is not known whether they need the bound
+                raise ValueError("it is decided by its arcs, but leaves without a solution are before that")
             piece.closed = ClosedPiece.read(piece.a, piece.b, batch[0], self.problem.p, held=self.problem.held)
             batch = batch[1:]
         if piece.closed is not None and not self.problem.held:

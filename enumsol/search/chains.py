@@ -195,6 +195,8 @@ class Chains:
         node, kind = curve.rows.conditions[condition]
         if node >= self.system.p:
             return None  # the rigid displacement reaches its bound
+        if (curve.rows.codes[node], kind) not in ACROSS:
+            return None  # several conditions vanish together: a node that sticks loses its force
         (code, _), *others = ACROSS[curve.rows.codes[node], kind]
         if others:
             slip = float(curve.at(alpha)[1][self.system.p + node])

@@ -120,12 +120,8 @@ def balanced(G: Ball, h: Ball, y: Floats, errors: float = 1.0) -> tuple[Floats, 
     leaves is enclosed: with W = G |y| G' and an approximate inverse R, ||I - R W|| < 1/2 gives ||s|| <= 2 ||R rest||.
     The third array, (m,), says which of them are shown to exist.
     """
-    G_abs, k = np.abs(G.mid) + G.rad, gamma(2 * G.shape[1] + 8)
-    # modes without load that move no contact node ask for nothing
-    used = np.flatnonzero(np.any(G_abs > 0, axis=1) | (np.abs(h.mid) + h.rad > 0))
-    (G_mid, G_rad), G_abs, (h_mid, h_rad) = (G.mid[used], G.rad[used]), G_abs[used], (h.mid[used], h.rad[used])
-    if not len(used):
-        return y, np.zeros_like(y), np.ones(len(y), dtype=bool)
+    G_mid, G_rad, h_mid, h_rad = G.mid, G.rad, h.mid, h.rad
+    G_abs, h_abs, k = np.abs(G_mid) + G_rad, np.abs(h_mid) + h_rad, gamma(2 * G.shape[1] + 8)
     turn = np.einsum("mrs,ms->mr", _inverses(G_mid, np.abs(y)), h_mid - y @ G_mid.T) @ G_mid
     small = np.all(np.abs(turn) < 0.5, axis=1)
     y = y * (1.0 + np.where(small[:, None], turn, 0.0))
@@ -134,8 +130,10 @@ def balanced(G: Ball, h: Ball, y: Floats, errors: float = 1.0) -> tuple[Floats, 
     W_rad = (
         k * _weighted(np.abs(G_mid), y_abs) + 2 * _product(G_rad, y_abs, G_abs) + 2 * _product(G_abs, y_abs, G_rad)
     ) * (1 + k) * SAFE + TINY
-    R_abs, j = np.abs(R), gamma(len(used) + 4)
-    defect = np.abs(np.eye(len(used)) - R @ W) + j * (R_abs @ np.abs(W)) + R_abs @ W_rad
+    R_abs, j = np.abs(R), gamma(len(h_abs) + 4)
+    # modes without load that move nothing where y is not zero ask for nothing: s is zero there
+    asked = (h_abs > 0) | ((y_abs > 0) @ (G_abs > 0).T)
+    defect = np.abs(np.eye(len(h_abs)) * asked[:, None, :] - R @ W) + j * (R_abs @ np.abs(W)) + R_abs @ W_rad
     sure = np.all(np.sum(defect * (1 + j) * SAFE, axis=2) < 0.5, axis=1)
     rest = np.abs(h_mid - y @ G_mid.T) + h_rad + y_abs @ G_rad.T + k * (np.abs(h_mid) + y_abs @ np.abs(G_mid).T)
     step = 2 * np.max(np.einsum("mrs,ms->mr", R_abs, rest), axis=1) * (1 + k) * (1 + j) * SAFE * SAFE
@@ -157,8 +155,9 @@ def is_unbalanced(system: EnclosedSystem, codes: Sequence[int], z: Floats) -> bo
         size = z_abs @ (np.abs(G.mid) + G.rad)
         slack = (z_abs @ G.rad + k * size) * (1 + k) * SAFE
         normal, across, F = work[:p], work[p:], system.F
-        spread = slack[:p] + (F + system.F_rad) * slack[p:] + system.F_rad * np.abs(across)
-        spread += k * (np.abs(normal) + F * np.abs(across))
+        # F is below zero where it vanishes at an end of an interval that is rounded outward
+        spread = slack[:p] + (np.abs(F) + system.F_rad) * slack[p:] + system.F_rad * np.abs(across)
+        spread += k * (np.abs(normal) + np.abs(F * across))
         # what underflows is less, and nothing of it is left where all is zero
         spread = np.where(size[:p] + size[p:] > 0, spread * (1 + k) * SAFE + TINY, 0.0)
         most = np.stack([normal, normal + F * across, normal - F * across]) + spread

@@ -143,6 +143,28 @@ def fewer(records, place):
     return found
 
 
+def test_leaves_before_the_form():
+    """Of leaves x before it nobody would tell that they need the bound of the rigid displacement."""
+    problem = varying(54)
+    graph = enumsol.branch_graph(problem, (0, 2))
+    records = records_of(graph.proof)
+    assert accepted_report(problem, graph.proof).within == problem.rigid_reach
+    (form,), empty = of_kind(records, "m"), of_kind(records, "x")
+    assert min(empty) > form
+    moved = [record for k, record in enumerate(records) if k not in empty]
+    moved[form:form] = [records[k] for k in empty]
+    (failure,) = enumsol.verify(problem, proof_of(moved)).failures
+    assert "before" in failure
+    with pytest.raises(Refused, match="before the form"):
+        check_records(problem, moved)
+
+
+def test_a_branch_on_which_a_node_that_sticks_loses_its_force():
+    problem = varying(56)
+    graph = whole_graph(problem, (0, 2))
+    assert check_records(problem, records_of(graph.proof)) == accepted_report(problem, graph.proof).selections
+
+
 def test_leaves_without_the_form():
     records = copied(proven()[2])
     (place,) = of_kind(records, "m")

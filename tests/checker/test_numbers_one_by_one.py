@@ -22,10 +22,18 @@ from rational_forms import Refused
 
 import enumsol
 from enumsol import ProofFormatError
+from enumsol.branches import ways
 
 
 def of_point(problem):
     return problem, records_of(enumsol.enumerate_roots(problem, 0).proof)
+
+
+def closed(problem, ends):
+    """The proof of a graph with a piece that is closed by its arcs, as of large bodies."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(ways, "FAST_EXACT_DOF", 0)
+        return problem, records_of(enumsol.branch_graph(problem, ends).proof)
 
 
 def of_history(problem, steps):
@@ -46,6 +54,7 @@ PROOFS = {
         for name in ("roots", "family", "in rationals", "forms", "sides", "alone")
     },
     **{f"floating {seed}": lambda seed=seed: of_point(random_body(seed)) for seed in (54, 8)},
+    "floating, closed": lambda: closed(pushed_block(1), (0.25, 0.75)),
     "block": lambda: of_point(block_on_table(cells=1, push=0.5, max_rigid_displacement=4.0)),
     **{name: functools.partial(written, name) for name in ("graph", "halves", "forms beside the unloaded state")},
     **{f"arcs, {name}": lambda name=name: original(name)[:2] for name in ("fold", "held by contact")},

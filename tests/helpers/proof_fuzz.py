@@ -294,7 +294,9 @@ def _others(old, record, path):
         value = Fraction(*(int(part, base) for part in old.split("/")))
         others = (-value, 2 * value, value / 2, value + 1, value + Fraction(1, 10**30), Fraction(0))
         yield from (_fraction(x, base, "/" in old) for x in others if x != value)
-        yield from (old[:i] + code + old[i + 1 :] for i in range(min(len(old), 6)) for code in "0123456" if base == 10)
+        yield from (
+            old[:i] + code + old[i + 1 :] for i in range(min(len(old), 6)) for code in "012345678" if base == 10
+        )
 
 
 def _sizes(x):

@@ -433,6 +433,7 @@ class Graph(Proof):
             need(roots == ["6" * self.p], "a piece closed by its arcs is not whole")
             allowed = {"m", "s", *self.beside_arcs}
             need(kinds.count("m") == 1 and set(kinds) <= allowed, "a piece closed by its arcs holds more than that")
+            need(not {"o", "i", "x"} & set(kinds[: kinds.index("m")]), "leaves are before the form")
             beside = [(kind, self.codes(text, 8), *rest) for kind, text, *rest in leaves if kind in self.beside_arcs]
             self.leaves += sum(kind != "x" for kind, *_ in beside)
         for kind, text, *rest in leaves:

@@ -118,7 +118,8 @@ class FloatingPiece(ClosedPiece):
             need(kind != "o" or first == 1, "a form was not declared")
 
     def check(self, traces, pairs, origin):
-        led = [selection.codes for selection, *_ in self._led(traces, pairs)]
+        found = self._led(traces, pairs)
+        led = [selection.codes for selection, *_ in found]
         final = [FINAL[i in self.rubbing] for i in range(self.p)]
         for selection in product(*final):
             need(any(self._below(selection, codes) for _, codes, *_ in self.leaves), "a selection is in no leaf")
@@ -127,8 +128,10 @@ class FloatingPiece(ClosedPiece):
                 forms = (self.data.forms(alpha) for alpha in (self.x, self.y))
                 balanced = [not form.unbalanced(codes, rest[0], self.scale[0]) for form in forms]
                 need(not any(balanced), "forces of a leaf may be in balance with the load")
-        for share in TRIED:
-            self._roots_at(self.x + share * (self.y - self.x), led, list(product(*final)))
+        # every selection that leads through the piece has its turn
+        alphas = [self.x + share * (self.y - self.x) for share in TRIED] + [(x + y) / 2 for _, x, y in found]
+        for alpha in dict.fromkeys(alphas):
+            self._roots_at(alpha, led, list(product(*final)))
 
     def _roots_at(self, alpha, led, selections):
         forms = self.data.forms(alpha)

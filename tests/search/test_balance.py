@@ -11,10 +11,12 @@ from floating_oracle import block_on_table
 from scipy.optimize import linprog
 
 import enumsol
+from enumsol.arithmetic.balls import Ball
 from enumsol.model.statuses import SLIP_MINUS, SLIP_PLUS, STICK, UNDECIDED
 from enumsol.search.certifiers.exclusions import in_balance
 from enumsol.search.reference_closer import Cover
 from enumsol.search.solvers import Solvers
+from enumsol.trusted.floating_bounds import balanced
 from enumsol.trusted.status_rows import FORBIDDEN, NONNEGATIVE, row_signs
 
 sys.path.insert(0, str(Path(__file__).parents[2] / "studies"))
@@ -49,6 +51,16 @@ def test_a_pin_that_nothing_but_contact_holds_has_one_solution():
     roots = enumsol.enumerate_roots(problem, 0, max_nodes=600)
     assert len(roots) == 1
     assert roots.complete
+
+
+@pytest.mark.parametrize(("load", "entry", "exists"), [(0.0, 0.0, True), (1e-30, 0.0, False), (0.0, 1e-30, False)])
+def test_a_mode_that_no_multiplier_moves_is_in_balance_only_without_load(load, entry, exists):
+    """In closed form: y = (3, -1) is the one solution of the last two equations, and the first is 0 = load."""
+    G, h = Ball.exact(np.array([[entry, 0, 5], [1, 1, 0], [1, -1, 0]])), Ball.exact(np.array([load, 2, 4]))
+    y, rad, sure = balanced(G, h, np.array([[3.0 + 2**-40, -1.0, 0.0]]))
+    assert sure[0] == exists
+    assert np.all(np.abs(y - [3, -1, 0]) <= rad) or not exists
+    assert np.all(rad < 1e-12) or not exists
 
 
 @pytest.mark.parametrize(

@@ -10,8 +10,10 @@ from complete import all_roots
 from helpers.floating_oracle import Oracle, block_on_table, random_body
 
 import enumsol
-from enumsol.condensation.enclosure import enclosure_of
+from enumsol.arithmetic.balls import Ball
+from enumsol.condensation.enclosure import EnclosedSystem, RigidRows, enclosure_of
 from enumsol.trusted.floating_bounds import is_confined, is_unbalanced, motion_against, without_bound
+from enumsol.trusted.status_rows import SLIP_MINUS, SLIP_PLUS, STICK
 
 
 def enclosed(problem):
@@ -65,6 +67,16 @@ def test_a_body_whose_forces_are_not_in_balance_has_no_solution():
                     assert not is_unbalanced(system, final, z)
                     assert not is_unbalanced(system, [6] * problem.p, z)
     assert found > 50
+
+
+def test_friction_below_zero_beside_an_interval_widens_what_forces_may_be():
+    G, one = Ball(np.array([[-0.01, 0.0]]), np.array([[0.0, 0.1]])), np.ones(1)
+    rows = RigidRows(G, Ball.exact(one), Ball.exact(0 * one), one, one)
+    eye, zero = np.eye(2), np.zeros(2)
+    for F, balanced in ((0.05, False), (-0.05, False), (0.5, True), (-0.5, True)):
+        system = EnclosedSystem(eye, 0 * eye, zero, zero, np.array([F]), np.zeros(1), rows=rows)
+        for codes in ([SLIP_PLUS], [SLIP_MINUS], [STICK]):
+            assert is_unbalanced(system, codes, one) == (not balanced)
 
 
 @pytest.mark.parametrize(("push", "confined"), [(0.0, True), (0.5, True), (0.99, True), (1.0, False), (1.25, True)])
