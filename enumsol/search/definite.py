@@ -30,13 +30,14 @@ _INSIDE, _SHARES = 0.9, 8
 #: Of the gap that a node has, what at first may serve for its slip; largest theta / F that Newton's method begins with.
 _SHARED, _CHOSEN = 0.5, 0.999
 #: Smallest eigenvalue, relative to H and the mean of the numbers, at which descent may end; and that is any use.
-_ENOUGH, _JUST = 2e-3, 1e-6
-#: Where no descent is tried; where another round is not, nor where a round leaves more than this share of what lacks.
-_HOPELESS, _FAR, _SLOW = -4.0, -0.5, 0.9
+_ENOUGH, _JUST = 5e-4, 1e-6
+#: Where no descent is tried; where another round is not, nor after so many rounds in a row that each leave more than
+#: this share of what lacks: one often does where the next ones go on.
+_HOPELESS, _FAR, _IN_VAIN, _SLOW = -4.0, -0.5, 2, 0.9
 #: Both where squares count: on blocks worse ones were not mended, or took longer than the tree.
 _HOPELESS_SQUARES, _FAR_SQUARES = -1.0, -0.14
 #: Rounds, steps of each, and the weight of H in one by what lacked before it.
-_ROUNDS, _EVALUATIONS, _ABOVE = 10, 15, 1.2
+_ROUNDS, _EVALUATIONS, _ABOVE = 16, 15, 1.05
 #: The objective where M is not definite.
 _BEYOND = 1e10
 
@@ -244,12 +245,14 @@ class Descent:
             # what mu begins with where squares count
             z[self._mu] = np.log(3.0)
         lowest, far = (_HOPELESS, _FAR) if self._spare is None else (_HOPELESS_SQUARES, _FAR_SQUARES)
-        least = self._least(z)
+        least, vain = self._least(z), 0
         for _ in range(_ROUNDS):
-            if least > _ENOUGH or least < lowest:
+            if least > _ENOUGH or least < lowest or vain == _IN_VAIN:
                 break
-            z = self._lowered(z, _ABOVE * max(-least, 0.0) + _ENOUGH)
-            least, lowest = self._least(z), max(_SLOW * least, far) if least < 0 else 0.0
+            before, lowest = least, far
+            z = self._lowered(z, _ABOVE * max(-before, 0.0) + _ENOUGH)
+            least = self._least(z)
+            vain = vain + 1 if least < _SLOW * before else 0
         return self._as_written(z) if least > _JUST else None
 
     def _lowered(self, z: Floats, weight: float) -> Floats:

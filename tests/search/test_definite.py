@@ -7,7 +7,7 @@ import pytest
 from effort import some
 from flint import fmpq, fmpq_mat
 
-from enumsol.search.definite import Nodes
+from enumsol.search.definite import Descent, Nodes
 from enumsol.search.reduction import WeightSource, weights_of
 
 
@@ -181,3 +181,34 @@ def test_wide_ranges_of_numbers_are_found(seed):
     R = R + (0.5 - min(0.0, np.linalg.eigvalsh(R + R.T)[0])) * np.eye(k)
     R *= 10.0 ** rng.uniform(-2, 2, size=(k, 1))
     assert_found(R)
+
+
+@pytest.mark.parametrize("chosen", [False, True])
+def test_descent_has_the_slope_of_its_objective(chosen):
+    # squares counted, against central differences; the smallest eigenvalue against that of H^-1 M
+    rng = np.random.default_rng(int(chosen))
+    m, F = 4, np.array([0.3, 1.0, 2.0])
+    X = rng.normal(size=(m + 3, m + 3))
+    R = X @ X.T + np.eye(m + 3) + 0.3 * np.triu(rng.normal(size=(m + 3, m + 3)), 1)
+    share, slip = np.array([0.5, -0.7, np.nan if chosen else 1.0]), np.array([0.0, 0.0, -0.4])
+    gap, wide = np.array([0.0, 0.0, 0.1]), np.zeros(3, dtype=bool)
+    normal = np.array([0, 1, 3])
+    nodes = Nodes(m, normal, m + np.arange(3), F, share, wide, gap, slip)
+    loads = rng.uniform(0.1, 0.5, m)
+    tangential = np.zeros(m)
+    tangential[normal] = 0.5 * F * loads[normal]
+    descent = Descent(R, nodes, np.stack([loads, tangential]))
+    z = 0.3 * rng.normal(size=m + 6)
+    weight, step = 4.0, 1e-5
+    slope = descent._objective(z, weight)[1]
+    ends = [[descent._objective(z + s * e, weight)[0] for s in (step, -step)] for e in np.eye(m + 6)]
+    assert slope == pytest.approx(np.array([(up - down) / (2 * step) for up, down in ends]), abs=1e-6)
+    mu, kappa, nu, rho, _ = descent._split(z)
+    D = np.zeros_like(R)
+    D[:m, :m], D[m:, m:] = np.diag(mu), np.diag(kappa)
+    D[m:, normal], D[normal, m:] = np.diag(nu), -np.diag(rho)
+    strength = mu * loads
+    strength[normal] += nu * tangential[normal]
+    M = D @ R + R[:m].T @ np.diag(strength) @ R[:m]
+    relative = np.linalg.eigvals(np.linalg.solve(R + R.T, M + M.T))
+    assert descent._least(z) == pytest.approx(np.min(relative.real) / np.mean(np.concatenate([mu, kappa])), abs=1e-9)
