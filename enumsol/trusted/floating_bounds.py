@@ -187,8 +187,12 @@ def _product(left: Floats, weights: Floats, right: Floats) -> Floats:
 def _inverses(G: Floats, weights: Floats) -> Floats:
     """Approximate inverses of G diag(weights) G'; what is not finite proves nothing."""
     W = _weighted(G, weights)
-    W = np.where(np.isfinite(W), W, 0.0)
-    return np.asarray(np.linalg.pinv(W, rcond=1e-13, hermitian=True))
+    size = np.sqrt(np.einsum("mrr->mr", W))
+    # modes of one size: a mode may be moved by small multipliers only
+    unit = 1.0 / np.where(size > 0, size, 1.0)
+    W = W * unit[:, :, None] * unit[:, None, :]
+    R = np.linalg.pinv(np.where(np.isfinite(W), W, 0.0), rcond=1e-13, hermitian=True)
+    return np.asarray(R * unit[:, :, None] * unit[:, None, :])
 
 
 #: Cells that are looked at before it is left open, and how narrow they may become.

@@ -63,6 +63,16 @@ def test_a_mode_that_no_multiplier_moves_is_in_balance_only_without_load(load, e
     assert np.all(rad < 1e-12) or not exists
 
 
+@pytest.mark.parametrize("size", [1.0, 2.0**-30, 2.0**-60])
+def test_a_mode_that_only_small_multipliers_move_is_brought_into_balance(size):
+    """In closed form: y = (3, -1, size); of a size that is lost in rounding beside the others as well."""
+    G, h = Ball.exact(np.array([[0.0, 0, 1], [1, 1, 0], [1, -1, 0]])), Ball.exact(np.array([size, 2, 4]))
+    y, rad, sure = balanced(G, h, np.array([[3.0 + 2**-40, -1.0, 1.25 * size]]))
+    assert sure[0]
+    assert np.all(np.abs(y - [3, -1, size]) <= rad)
+    assert np.all(rad < 1e-12)
+
+
 @pytest.mark.parametrize(
     ("made", "led"),
     [(partial(stack, 1), True), (partial(telescope, 12), False), (partial(pin, 24, 0.5, half=False), False)],
