@@ -5,7 +5,8 @@ and as they are (after 1,000): nodes, seconds, size of the proof, and seconds of
 other numbers of steps of the ascent. Then blocks with 256 contact nodes: what every part of the work takes. Then long
 searches of wedges with the energy, and how many of their bounds balls did not prove (theory, section 6.2). All
 seconds are those of the processor, here of a machine shared with other work. Those of one problem are taken one after
-the other; read their ratios.
+the other; read their ratios. Tables ``neighbours`` and ``neighbours_trees`` are about forms with products of rows of
+neighbouring nodes, which the package does not have: README.md concludes.
 
 Read "nodes" against "nodes, energy": the gain grows with p, and there is none on wedges, where the trial says so and
 costs what "seconds" has more than "seconds, energy". With a good form a block takes five nodes of the tree for every
@@ -55,6 +56,7 @@ from typing import TYPE_CHECKING
 
 import enumsol
 from enumsol.search import form_policy as policy
+from forms import neighbours_tree
 from shared.loads import DRAGGED, PRESSED, block, oblique_wedge, straight_wedge
 
 if TYPE_CHECKING:
@@ -197,3 +199,4 @@ def main(run: Run) -> None:
     run.table("steps", [line for loaded in blocks for line in by_steps(loaded, choices)])
     run.table("wide", list(wide(SMOKE_WIDE if run.smoke else WIDE)))
     run.table("wedges", [wedge(oblique_wedge(p)) for p in (SMOKE_WEDGES if run.smoke else WEDGES)])
+    neighbours_tree.tables(run)

@@ -63,6 +63,7 @@ LONG = (
     "extremes",
     "fixed_points_basins",
     "fixed_points_scaling",
+    "forms",
     "grazing",
     "histories",
     "jamming_wedge",
