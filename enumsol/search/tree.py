@@ -127,11 +127,9 @@ class TreeSearch:
         """True if one certificate proves that the problem has one solution."""
         if self.limits.max_nodes == 0:
             return False
-        try:
-            with within(self.limits):
-                found = self.closer.whole()
-        except TimeOverError:
-            return False
+        found = None
+        with suppress(TimeOverError), within(self.limits):
+            found = self.closer.whole()
         if not self._close(item, found):
             return False
         self.outcome.nodes += 1
@@ -158,11 +156,9 @@ class TreeSearch:
 
     def _pays(self, forms: Forms) -> bool:
         """True if a form is found that is better than the energy, before the time is over."""
-        try:
-            with within(self.limits):
-                return forms.pay(self.relaxations.engine, self.relaxations.nothing, self.relaxations.rows)
-        except TimeOverError:
-            return False
+        with suppress(TimeOverError), within(self.limits):
+            return forms.pay(self.relaxations.engine, self.relaxations.nothing, self.relaxations.rows)
+        return False
 
     def _forget(self, held: KeptRecords) -> None:
         held.drop()
@@ -379,8 +375,7 @@ class TreeSearch:
             return False
         # in 3D no family is known, and nodes cost more
         most = _AT_LIMIT if self.at_limit.codes is not None else _AT_LIMIT // 8
-        many = self.limits.max_nodes is None and self.outcome.nodes >= most
-        return bool(self.outcome.undecided) or many
+        return bool(self.outcome.undecided) or (self.limits.max_nodes is None and self.outcome.nodes >= most)
 
     def report(self, share: float = 0.0) -> None:
         """Tell that so much more of the tree is done, and how many nodes were examined."""
