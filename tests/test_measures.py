@@ -11,13 +11,13 @@ from documents import ROOT
 
 #: A change that lowers a measure lowers its bound; one that has to raise it says why in its commit.
 BOUNDS = {
-    "code lines": 51_550,
-    "classes": 627,
+    "code lines": 52_993,
+    "classes": 631,
     "kinds of records": 20,
-    "parameters annotated Any": 116,
-    "files": 333,
+    "parameters annotated Any": 115,
+    "files": 320,
     "docstrings that begin with a pronoun": 26,
-    "class names used twice or more": 9,
+    "class names used twice or more": 4,
 }
 _NO_CODE = (tokenize.COMMENT, tokenize.NL, tokenize.NEWLINE, tokenize.INDENT, tokenize.DEDENT, tokenize.ENDMARKER)
 _PRONOUN = re.compile(r"(What|Of|The same|Where|Those|That|As|In which|How|Whether|One)\b")
