@@ -256,7 +256,7 @@ class StabilityVerificationReport:
     >>> enumsol.verify(problem, proof)
     proof: verified for the stability of 3 roots at alpha = 0.2
       root 0: does not run away
-      root 1: runs away, growing like exp(rho t), rho = 3.4249
+      root 1: runs away, growing like exp(rho t), rho = 3.42...
       root 2: does not run away
       in all: 1 run away, 2 do not, 0 undecided
       list of roots: complete

@@ -1,4 +1,4 @@
-"""The condensed equation H = 0 on which the continuation works (theory, sections 1.2 and 8.1, in 3D section 8.12).
+"""The condensed equation H = 0 on which the continuation works (theory, sections 1.2, 8.1 and 8.12).
 
 H is the residual of a contact problem; with it come its test functions and selections (theory, section 2).
 """

@@ -230,7 +230,7 @@ class Spread(ABC):
             groups.insert(0, roots[ALONE:])
         return [TreePart((*place, k), group) for k, group in enumerate(groups)]
 
-    def _further(self, part: TreePart, answer: Answer) -> list[TreePart]:
+    def further(self, part: TreePart, answer: Answer) -> list[TreePart]:
         """The parts that an answer leaves; the root that is to be examined here is one of its own."""
         if not answer.wanted:
             return self._parts(part.place, answer.rest)
@@ -266,7 +266,7 @@ class Spread(ABC):
                 self._send(done, whole=True)  # it went to a worker that had nothing yet
                 continue
             self._known, done.answer = True, job.result
-            done.further = self._further(done, job.result)
+            done.further = self.further(done, job.result)
             self._hand_out(done.further)
         return True
 

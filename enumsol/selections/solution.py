@@ -9,7 +9,6 @@ from math import comb
 from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
-from flint import fmpq
 
 from enumsol.errors import TooLargeError
 from enumsol.support.deadlines import look
@@ -115,6 +114,8 @@ Form = tuple[list[Any], Any]
 
 def dot(a: Sequence[Any], b: Sequence[Any]) -> Any:
     """Inner product; factors that are zero cost nothing."""
+    from flint import fmpq  # only here are roots rational
+
     return sum((x * y for x, y in zip(a, b, strict=True) if x != 0 and y != 0), fmpq(0))
 
 
@@ -145,6 +146,8 @@ def polytope_vertices(equations: list[Form], inequalities: list[Form], reduce: R
 
 def _affine_solutions(equations: list[Form], reduce: Reduction) -> tuple[Point, list[Point]] | None:
     """Solution of the equations and a kernel basis, or None when they contradict each other."""
+    from flint import fmpq
+
     size = len(equations[0][0])
     table, pivots = reduce([[*form, -constant] for form, constant in equations])
     if size in pivots:

@@ -68,6 +68,7 @@ class Crew:
 
     def __init__(self, executor: Executor) -> None:
         self._executor: Executor | None = executor
+        self._near = isinstance(getattr(executor, "_max_workers", None), int)
         self.redone = 0
         #: Workers, and when a cluster was last asked for their number.
         self._count, self._asked = _UNKNOWN, -_ASKED_AFTER
@@ -99,7 +100,7 @@ class Crew:
     @property
     def near(self) -> bool:
         """True for a pool of this machine, to which handing out a task costs little."""
-        return isinstance(getattr(self._executor, "_max_workers", None), int)
+        return self._near
 
     def submit(self, function: Callable[..., Any], *arguments: Any) -> Job:
         """Hand out a task."""

@@ -79,12 +79,12 @@ class Relaxed:
 
     def __init__(self, engine, energy, modes, parent=None, formed=None):
         self._engine, self._energy, self._modes, self._formed = engine, energy, modes, formed
-        self._u = engine.forms.energy if parent is None else parent._u
-        self._level = 0 if parent is None else parent._level + 1
+        self.u = engine.forms.energy if parent is None else parent.u
+        self.level = 0 if parent is None else parent.level + 1
         self.pruned = energy.pruned or _excludes(formed)
-        if not (self.pruned or energy.stalled) and self._level % engine.levels == 0:
-            found = engine.forms.solve(modes, self._u)
-            self.pruned, self._u = found.excluded, found.u
+        if not (self.pruned or energy.stalled) and self.level % engine.levels == 0:
+            found = engine.forms.solve(modes, self.u)
+            self.pruned, self.u = found.excluded, found.u
             if engine.levels > 1 and not found.excluded:
                 self._formed = engine.with_form(modes, found) or self._formed
                 self.pruned = _excludes(self._formed)

@@ -51,7 +51,7 @@ class Here(Executor):
 
 def tasks_of(problem, alpha, *, near, **limits):
     """Tasks by their place in the tree, and processor time of the calling process; of a pool, or of a cluster."""
-    tasks, here, before = {}, Here(), Spread._further
+    tasks, here, before = {}, Here(), Spread.further
 
     def further(self, part, answer):
         found = before(self, part, answer)
@@ -59,7 +59,7 @@ def tasks_of(problem, alpha, *, near, **limits):
         tasks[part.place] = Task(here.times[id(answer)], answer.nodes, size, tuple(part.place for part in found))
         return found
 
-    with mock.patch.object(Spread, "_further", further), mock.patch.object(Crew, "near", near):
+    with mock.patch.object(Spread, "further", further), mock.patch.object(Crew, "near", near):
         started = time.process_time()
         enumsol.enumerate_roots(problem, alpha, executor=here, **limits)
         calling = time.process_time() - started - sum(here.times.values())

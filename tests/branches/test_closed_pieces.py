@@ -65,7 +65,7 @@ def test_numbers_are_sought_where_plain_ones_do_not_serve():
     problem = gallery.clamped_block(32, 16, 0.5, traction=(1.0, -0.3))
     graph = proven_graph(problem, (1, 2))
     assert graph.stats.nodes == 0
-    assert any(np.any(found.numbers.nu) for found in graph.pieces if found.numbers is not None)
+    assert any(np.any(found.closed.numbers.nu) for found in graph.pieces if found.closed is not None)
 
 
 def test_a_load_that_vanishes_inside():

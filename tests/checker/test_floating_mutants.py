@@ -116,7 +116,7 @@ def test_leaves_that_rest_on_a_body_that_is_held(body):
 
 
 #: Bodies whose proofs have leaves of all kinds that refer to a root, and a block that sticks and slips.
-REFERRED = {seed: lambda seed=seed: random_body(seed).replace(load_slope=None, friction_slope=0.0) for seed in (54, 8)}
+REFERRED = {seed: lambda seed=seed: random_body(seed).replace(load_slope=None, friction_slope=0.0) for seed in (23, 8)}
 REFERRED |= {"block": lambda: block_on_table(cells=1, push=0.5, max_rigid_displacement=4.0)}
 
 

@@ -17,6 +17,7 @@ class DyingExecutor(Executor):
 
     def __init__(self, inner, healthy, *last):
         self.inner, self.healthy, self.last, self.futures = inner, healthy, last, []
+        self._max_workers = getattr(inner, "_max_workers", 1)
 
     def submit(self, function, /, *args, **kwargs):
         if len(self.futures) == self.healthy:

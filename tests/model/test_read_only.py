@@ -141,7 +141,7 @@ def test_matrices_are_made_without_copying_and_work_as_any(problem):
 
 
 def test_no_array_of_a_problem_can_be_written(problem):
-    assert len(problem.factorization._pivots) == 4
+    assert len(problem.factorization._parts[0]) == 4
     parts = [
         "_A.data",
         "f",
@@ -149,7 +149,7 @@ def test_no_array_of_a_problem_can_be_written(problem):
         "friction_slope",
         "coordinates",
         "factorization._scale",
-        "factorization._pivots",
+        "factorization._parts[0]",
     ]
     parts += [f"condensed.{name}" for name in ("S", "g0", "g1")]
     parts += [f"enclosure.{name}{end}" for name in ("S", "g0", "g1") for end in ("", "_rad")]

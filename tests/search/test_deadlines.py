@@ -19,7 +19,6 @@ from enumsol import ContactProblem, branch_graph, enumerate_roots, gallery, veri
 from enumsol.branches import gluing
 from enumsol.branches.enclosed.tracing import _Tracing
 from enumsol.branches.known_selections import KnownSelections
-from enumsol.condensation import products
 from enumsol.condensation.factorization import Factorization
 from enumsol.relaxation.convex_forms import FormAscent
 from enumsol.search import form_policy as forms
@@ -156,7 +155,7 @@ def test_a_long_call_ends_at_once_on_ctrl_c(endless):
 
 @pytest.mark.parametrize("build", [lambda: gallery.clamped_block(8, 4), lambda: gallery.block3d(2, 2, 2)])
 def test_a_body_that_is_not_condensed_in_time(clock, takes, monkeypatch, tmp_path, build):
-    monkeypatch.setattr(products, "_COLUMNS", 1)
+    monkeypatch.setattr(Factorization, "columns", 1)
     takes(Factorization, "solve")
     problem = build()
     roots = enumerate_roots(problem, 0, time_limit=4.0, proof_path=tmp_path / "p")
@@ -169,7 +168,7 @@ def test_a_body_that_is_not_condensed_in_time(clock, takes, monkeypatch, tmp_pat
 
 @pytest.mark.parametrize("arithmetic", ["verified", "fast"])
 def test_a_body_that_is_not_condensed_in_time_has_a_graph_of_nothing(clock, takes, monkeypatch, arithmetic):
-    monkeypatch.setattr(products, "_COLUMNS", 1)
+    monkeypatch.setattr(Factorization, "columns", 1)
     takes(Factorization, "solve")
     problem = gallery.clamped_block(8, 4)
     graph = branch_graph(problem, (0, 1), arithmetic, time_limit=4.0)

@@ -144,7 +144,7 @@ def test_an_interruption_keeps_what_came_in(small_parts, wedge, tmp_path):
 
 
 @pytest.mark.slow
-def test_dask(small_parts, wedge):
+def test_dask(small_parts, monkeypatch, wedge):
     distributed = pytest.importorskip("distributed")
     problem, alpha, whole = wedge
     with (
@@ -152,6 +152,7 @@ def test_dask(small_parts, wedge):
         distributed.Client(cluster) as client,
     ):
         found = enumerate_roots(problem, alpha, executor=client.get_executor())
+    monkeypatch.setattr(Crew, "near", False)
     with ThreadPoolExecutor(1) as executor:
         alone = enumerate_roots(problem, alpha, executor=executor)
     assert not differences(found, whole, rtol=1e-12)
