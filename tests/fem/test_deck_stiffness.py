@@ -1,5 +1,6 @@
 """Stiffness of decks as CalculiX assembles it, against the package's own where both have the same elements."""
 
+import runpy
 import shutil
 import subprocess
 from dataclasses import replace
@@ -11,9 +12,10 @@ from small_decks import by_hand, deck, step
 
 import enumsol
 from enumsol.errors import InvalidArgumentError, InvalidProblemError
-from studies.against_calculix.decks import CASES
 from tests.helpers.command_line import run
+from tests.helpers.documents import ROOT
 
+CASES = runpy.run_path(str(ROOT / "studies" / "against_calculix" / "decks.py"))["CASES"]
 #: What CalculiX 2.20 wrote for the elements of the deck of two blocks.
 RECORDED = Path(__file__).parent / "assembled"
 needs_calculix = pytest.mark.skipif(shutil.which("ccx") is None, reason="CalculiX is not installed")
