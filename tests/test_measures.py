@@ -11,7 +11,7 @@ from documents import ROOT
 
 #: A change that lowers a measure lowers its bound; one that has to raise it says why in its commit.
 BOUNDS = {
-    "code lines": 52_995,
+    "code lines": 52_975,
     "classes": 631,
     "kinds of records": 20,
     "parameters annotated Any": 115,

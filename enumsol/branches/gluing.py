@@ -39,8 +39,7 @@ from enumsol.roots.local_branch import named_statuses, sign_over
 from enumsol.roots.root import Polytope, RootFamily
 from enumsol.search.outcome import Stop, StopReason
 from enumsol.selections.functions import SelectionFunctions
-from enumsol.selections.rational_selections import FiberSelections, as_float
-from enumsol.selections.solution import dot
+from enumsol.selections.rational_selections import FiberSelections, as_float, dot
 from enumsol.support.deadlines import TimeOverError, look, tell
 
 if TYPE_CHECKING:

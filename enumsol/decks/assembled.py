@@ -25,6 +25,8 @@ if TYPE_CHECKING:
 
 #: Directions of displacements as Ansys labels them.
 _LABELS = {"UX": 1, "UY": 2, "UZ": 3}
+#: An axisymmetric body is a slice of two degrees to CalculiX: so many make the whole.
+SLICES = 180.0
 
 
 @dataclass(frozen=True, eq=False)

@@ -2,17 +2,17 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
 from enumsol.decks.cards import DeckPlace, key, shown
 from enumsol.decks.faces import named_faces
-from enumsol.decks.model import Account, Deck, DeckRegion, Members, RigidProfile, Surface, by_block
+from enumsol.decks.model import Account, Deck, DeckRegion, Members, Numbers, RigidProfile, Surface, by_block
 from enumsol.decks.registry import Reading
 from enumsol.decks.rigid import add_layers, add_profiles
 from enumsol.errors import InvalidArgumentError
-from enumsol.support.array_types import Floats, Integers, Mask
+from enumsol.support.array_types import Floats, Integers
 from enumsol.support.messages import counted, listed
 
 _NONE = np.zeros(0, dtype=np.int64)
@@ -59,33 +59,6 @@ def put_together(reading: Reading) -> Deck:
     return deck
 
 
-@dataclass(frozen=True, eq=False)
-class _Numbers:
-    """Numbers in a region, in ascending order, and their rows in the deck."""
-
-    sorted: Integers
-    rows: Integers
-
-    @classmethod
-    def of(cls, labels: Integers, first: int) -> _Numbers:
-        order = np.argsort(labels, kind="stable")
-        return cls(labels[order], first + order)
-
-    def found(self, labels: Integers) -> tuple[Integers, Mask]:
-        """Row of each number, and whether there is one."""
-        if not len(self.sorted):
-            return np.zeros(len(labels), dtype=np.int64), np.zeros(len(labels), dtype=bool)
-        at = np.minimum(np.searchsorted(self.sorted, labels), len(self.sorted) - 1)
-        return self.rows[at], self.sorted[at] == labels
-
-    def within(self, numbers: range) -> Integers:
-        """Rows of the numbers in a range."""
-        own = self.sorted
-        return np.asarray(
-            self.rows[(own >= numbers.start) & (own < numbers.stop) & ((own - numbers.start) % numbers.step == 0)]
-        )
-
-
 class _Whole:
     """All regions together, while they are added."""
 
@@ -93,7 +66,7 @@ class _Whole:
         self.deck = deck
         self.points: list[Floats] = []
         self.labels: list[Integers] = []
-        self.numbers: dict[tuple[str, str], _Numbers] = {}
+        self.numbers: dict[tuple[str, str], Numbers] = {}
         self.sets: dict[tuple[str, str], tuple[Members, str]] = {}
         self.known: dict[tuple[str, str], Integers] = {}
         self.profiles: dict[str, RigidProfile] = {}
@@ -102,7 +75,7 @@ class _Whole:
     def add(self, instance: str, region: DeckRegion) -> None:
         """Add the nodes, elements and sets of a region."""
         labels, points = _distinct_nodes(region)
-        numbers = self.numbers["NSET", instance] = _Numbers.of(labels, self.nodes)
+        numbers = self.numbers["NSET", instance] = Numbers.of(labels, self.nodes)
         self.points.append(region.moved(points))
         self.labels.append(labels)
         for block in region.blocks:
@@ -117,7 +90,7 @@ class _Whole:
             self.deck.blocks.append(replace(block, nodes=rows.reshape(block.nodes.shape)))
         own = np.concatenate([_NONE, *(block.labels for block in region.blocks)])
         _check_distinct(own, region)
-        self.numbers["ELSET", instance] = _Numbers.of(own, self.elements)
+        self.numbers["ELSET", instance] = Numbers.of(own, self.elements)
         before = f"{instance}." if instance else ""
         self.sets |= {(kind, before + name): (members, instance) for (kind, name), members in region.sets.items()}
         self.deck.orientations |= {

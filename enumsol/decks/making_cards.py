@@ -7,7 +7,7 @@ from collections.abc import Callable
 import numpy as np
 
 from enumsol.decks.cards import Card, key
-from enumsol.decks.model import DeckRegion, ElementBlock, by_block
+from enumsol.decks.model import DeckRegion, ElementBlock, Numbers, by_block
 from enumsol.decks.registry import Reading, card
 from enumsol.support.array_types import Floats, Integers
 from enumsol.support.messages import counted
@@ -184,12 +184,10 @@ def _members(reading: Reading, given: Card, kind: str, name: str, row: int | Non
 
 def _rows(known: Integers, wanted: Integers, lost: Callable[[int], Exception]) -> Integers:
     """Places of numbers among those that are known."""
-    order = np.argsort(known, kind="stable")
-    at = np.searchsorted(known, wanted, sorter=order)
-    there = known[order[np.minimum(at, len(known) - 1)]] == wanted if len(known) else np.zeros(len(wanted), dtype=bool)
+    rows, there = Numbers.of(known, 0).found(wanted)
     if not np.all(there):
         raise lost(int(wanted[np.argmin(there)]))
-    return order[at]
+    return rows
 
 
 def _places(region: DeckRegion, given: Card, labels: Integers, row: int | None) -> Floats:

@@ -18,7 +18,7 @@ from enumsol.decks.cards import DeckPlace, is_number, key, shown
 from enumsol.decks.elements import ElementType
 from enumsol.decks.steps import Analysis, Coupling
 from enumsol.errors import InvalidArgumentError
-from enumsol.support.array_types import Floats, Integers
+from enumsol.support.array_types import Floats, Integers, Mask
 from enumsol.support.messages import listed
 
 
@@ -71,6 +71,34 @@ def by_block(blocks: Iterable[ElementBlock], rows: Integers) -> Iterator[tuple[i
         if len(own):
             yield first, block, own
         first += len(block.labels)
+
+
+@dataclass(frozen=True, eq=False)
+class Numbers:
+    """Numbers in a region, in ascending order, and their rows in the deck."""
+
+    sorted: Integers
+    rows: Integers
+
+    @classmethod
+    def of(cls, labels: Integers, first: int) -> Numbers:
+        """Numbers of a region whose rows begin with ``first``; of those that occur twice the first one is found."""
+        order = np.argsort(labels, kind="stable")
+        return cls(labels[order], first + order)
+
+    def found(self, labels: Integers) -> tuple[Integers, Mask]:
+        """Row of each number, and whether there is one."""
+        if not len(self.sorted):
+            return np.zeros(len(labels), dtype=np.int64), np.zeros(len(labels), dtype=bool)
+        at = np.minimum(np.searchsorted(self.sorted, labels), len(self.sorted) - 1)
+        return self.rows[at], self.sorted[at] == labels
+
+    def within(self, numbers: range) -> Integers:
+        """Rows of the numbers in a range."""
+        own = self.sorted
+        return np.asarray(
+            self.rows[(own >= numbers.start) & (own < numbers.stop) & ((own - numbers.start) % numbers.step == 0)]
+        )
 
 
 @dataclass(eq=False)

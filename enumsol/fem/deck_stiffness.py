@@ -19,7 +19,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 import scipy.sparse as sp
 
-from enumsol.decks.assembled import read_calculix_stiffness
+from enumsol.decks.assembled import SLICES, read_calculix_stiffness
 from enumsol.errors import InvalidArgumentError, InvalidProblemError
 from enumsol.fem.cell_blocks import completing
 from enumsol.fem.constraints import Equation
@@ -38,8 +38,6 @@ if TYPE_CHECKING:
 CODES = ("ccx",)
 #: Numbers on a line of a deck at most.
 _ON_A_LINE = 8
-#: An axisymmetric body is a slice of two degrees to CalculiX.
-_SLICES = 180.0
 #: Lines of the output of a run that failed that are told.
 _LAST = 4
 
@@ -182,7 +180,7 @@ def _by_displacements(scene: Scene, deck: Deck, used: Integers, found: Assembled
             "are not held"
         )
     A = found.A.tocoo()
-    factor = _SLICES if scene.body.axisymmetric else 1.0
+    factor = SLICES if scene.body.axisymmetric else 1.0
     count = known.count + len(inside)
     return sp.csc_array((factor * A.data, (rows[A.coords[0]], rows[A.coords[1]])), shape=(count, count))
 

@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 import scipy.sparse as sp
 
+from enumsol.decks.assembled import SLICES
 from enumsol.decks.states import states_of
 from enumsol.errors import InvalidArgumentError
 from enumsol.fem.cell_blocks import completing
@@ -35,8 +36,6 @@ if TYPE_CHECKING:
 _NONE = 1e-9
 #: Terms of an equation on a line.
 _TERMS = 4
-#: CalculiX has a slice of two degrees of an axisymmetric body.
-_SLICE = 1.0 / 180.0
 
 
 def write_start(model: DeckModel, root: SolvedState, file: str | os.PathLike[str], *, step: int | None = None) -> None:
@@ -106,7 +105,7 @@ def _slips(
     labels = [label if isinstance(label, int) else -1 for label in mesh.node_labels or ()]
     own, moved = _without_completing(scene), np.asarray(rows.means @ moves)
     frames = np.stack(scene.tangents, axis=1)
-    along = (-_SLICE if scene.body.axisymmetric else -1.0) * friction.reshape(len(frames), -1)
+    along = (-1.0 / SLICES if scene.body.axisymmetric else -1.0) * friction.reshape(len(frames), -1)
     forces: list[float] = []
     first = 1 + int(max(deck.node_labels))
     for k, node in enumerate(rows.nodes):

@@ -1,4 +1,7 @@
-"""Selections solved in rational arithmetic: the given data read as exact rationals (theory, section 6.5)."""
+"""Selections solved in rational arithmetic: the given data read as exact rationals (theory, section 6.5).
+
+Of singular selections the vertices of polytopes of roots, in any exact ordered field (theory, section 2.4).
+"""
 
 from __future__ import annotations
 
@@ -6,6 +9,7 @@ import math
 from copy import copy
 from fractions import Fraction
 from functools import cached_property
+from itertools import combinations
 from typing import TYPE_CHECKING, Any, SupportsFloat
 
 import numpy as np
@@ -14,25 +18,23 @@ from flint import fmpq, fmpq_mat
 from enumsol.arithmetic.rationals import as_objects, rational, to_fraction
 from enumsol.condensation.exact import ExactCondensed, ExactSystem, UncondensedSystem
 from enumsol.model.statuses import CONDITIONS, FINAL, FRICTIONLESS, OPEN, SLIP_MINUS, SLIP_PLUS, STICK, RowKind
-from enumsol.selections.solution import (
-    ActiveSets,
-    Form,
-    Point,
-    SelectionSolution,
-    VertexLimitError,
-    dot,
-    polytope_vertices,
-    value,
-)
+from enumsol.selections.solution import MAX_BASES, ActiveSets, SelectionSolution, VertexLimitError
 from enumsol.support.deadlines import look
 from enumsol.trusted.selection import Selection, row_values
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Callable, Sequence
 
     from enumsol.model.statuses import Conditions
-    from enumsol.selections.solution import Table
     from enumsol.support.array_types import Codes, Floats, Integers, NDArray
+
+    Table = list[list[Any]]
+    #: Rows of the reduced row echelon form that are not zero, and their pivot columns.
+    Reduction = Callable[[Table], tuple[Table, list[int]]]
+
+Point = tuple[Any, ...]
+#: A linear form over lambda and its constant: value = form . lambda + constant.
+Form = tuple[list[Any], Any]
 
 
 def _outward(number: fmpq) -> tuple[float, float]:
@@ -369,3 +371,88 @@ def row_reduce(table: list[list[Any]]) -> tuple[Any, list[int]]:
         pivots.append(column)
     full = pivots == list(range(len(table)))
     return (det if full else fmpq(0)), pivots
+
+
+def dot(a: Sequence[Any], b: Sequence[Any]) -> Any:
+    """Inner product; factors that are zero cost nothing."""
+    return sum((x * y for x, y in zip(a, b, strict=True) if x != 0 and y != 0), fmpq(0))
+
+
+def value(form: Form, point: Sequence[Any]) -> Any:
+    """A form at a point."""
+    return dot(form[0], point) + form[1]
+
+
+def polytope_vertices(equations: list[Form], inequalities: list[Form], reduce: Reduction) -> list[Point]:
+    """Vertices of a bounded polyhedron {equations = 0, inequalities >= 0}; empty when it is.
+
+    Raises
+    ------
+    VertexLimitError
+        More than MAX_BASES bases would have to be tried.
+    """
+    solved = _affine_solutions(equations, reduce)
+    if solved is None:
+        return []
+    origin, kernel = solved
+    rows = _distinct([([dot(form, k) for k in kernel], dot(form, origin) + c) for form, c in inequalities])
+    if any(constant < 0 for row, constant in rows if not any(row)):
+        return []
+    if not kernel:
+        return [origin]
+    return _corners(origin, kernel, [(row, constant) for row, constant in rows if any(row)], reduce)
+
+
+def _affine_solutions(equations: list[Form], reduce: Reduction) -> tuple[Point, list[Point]] | None:
+    """Solution of the equations and a kernel basis, or None when they contradict each other."""
+    size = len(equations[0][0])
+    table, pivots = reduce([[*form, -constant] for form, constant in equations])
+    if size in pivots:
+        return None
+    origin = [fmpq(0)] * size
+    for row, pivot in zip(table, pivots, strict=True):
+        origin[pivot] = row[size]
+    kernel = []
+    for free in (j for j in range(size) if j not in pivots):
+        vector = [fmpq(0)] * size
+        vector[free] = fmpq(1)
+        for row, pivot in zip(table, pivots, strict=True):
+            vector[pivot] = -row[free]
+        kernel.append(tuple(vector))
+    return tuple(origin), kernel
+
+
+def _distinct(rows: list[Form]) -> list[Form]:
+    """Rows without repetition; every row is divided by the size of its first entry that is not zero."""
+    found: list[Form] = []
+    for row, constant in rows:
+        head = next((v for v in row if v != 0), None)
+        if head is None:
+            scaled = (row, constant)
+        else:
+            size = head if head > 0 else -head
+            scaled = ([v / size for v in row], constant / size)
+        if scaled not in found:
+            found.append(scaled)
+    return found
+
+
+def _corners(origin: Point, kernel: list[Point], rows: list[Form], reduce: Reduction) -> list[Point]:
+    """Points origin + sum of t_k kernel_k at which as many rows vanish as there are t, and none is negative."""
+    size = len(kernel)
+    if math.comb(len(rows), size) > MAX_BASES:
+        raise VertexLimitError(
+            f"a family of roots has {math.comb(len(rows), size)} candidate vertices; at most {MAX_BASES} are enumerated"
+        )
+    found: list[Point] = []
+    for basis in combinations(rows, size):
+        look()
+        table, pivots = reduce([[*row, -constant] for row, constant in basis])
+        if pivots != list(range(size)):
+            continue
+        t = [row[-1] for row in table]
+        if all(value(row, t) >= 0 for row in rows):
+            point = tuple(o + dot(t, [k[j] for k in kernel]) for j, o in enumerate(origin))
+            if point not in found:  # elements of number fields have no hash
+                found.append(point)
+    return found

@@ -26,8 +26,7 @@ if TYPE_CHECKING:
     from enumsol.search.certifiers.exclusions import Exclusions
     from enumsol.search.reduction import Point, Proposal
     from enumsol.search.reference_closer import OnlyRoot
-    from enumsol.selections.rational_selections import ExactSelections
-    from enumsol.selections.solution import Form
+    from enumsol.selections.rational_selections import ExactSelections, Form
     from enumsol.support.array_types import Codes, Floats, Indices
     from enumsol.trusted.at_alpha import VerifiedSelection
     from enumsol.trusted.reference import Reference
