@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any, SupportsIndex
 import numpy as np
 import scipy.sparse as sp
 import scipy.sparse.linalg as spla
+from scipy.linalg import cho_solve, eigh
 from scipy.linalg.lapack import dgetrf, dtrtri
 
 if TYPE_CHECKING:
@@ -38,6 +39,8 @@ SAFE = 1.0 + 2.0**-40
 TINY = 2.0**-960
 #: The same for the norms of such data.
 ROOT_TINY = 2.0**-480
+#: From so many rows on a smallest eigenvalue is found by Lanczos' method, so accurately.
+_MANY_ROWS, _NEARLY = 1000, 1e-3
 
 
 def gamma(k: int) -> float:
@@ -134,6 +137,24 @@ def factor_above(M: Array, shift: float = 0.0) -> Array | None:
         return None
 
 
+def lowest_mode(A: Array, M: Array | None = None, shift: float = 0.0) -> tuple[float, Array]:
+    """The smallest eigenvalue of a symmetric matrix, relative to M, and its eigenvector; no claim.
+
+    Raises
+    ------
+    numpy.linalg.LinAlgError
+        A + shift M is not positive definite.
+    """
+    if len(A) < _MANY_ROWS:
+        values, modes = eigh(A, M, subset_by_index=[0, 0], check_finite=False)
+        return float(values[0]), np.asarray(modes[:, 0])
+    L = np.linalg.cholesky(A + shift * M if M is not None else A)
+    inverse = spla.LinearOperator(A.shape, lambda x: cho_solve((L, True), x, check_finite=False), dtype=float)
+    start = np.random.default_rng(0).normal(size=len(A))
+    values, modes = spla.eigsh(A, 1, M, sigma=-shift, OPinv=inverse, v0=start, tol=_NEARLY)
+    return float(values[0]), np.asarray(modes[:, 0])
+
+
 def dense_eigenvalue_bound(S: Array) -> float:
     """Lower bound on the smallest eigenvalue of a symmetric dense matrix; at most 0 when none positive was proven.
 
@@ -141,7 +162,7 @@ def dense_eigenvalue_bound(S: Array) -> float:
     """
     n = len(S)
     try:
-        estimate = float(np.linalg.eigvalsh(S)[0])
+        estimate = float(np.linalg.eigvalsh(S)[0]) if n < _MANY_ROWS else lowest_mode(S)[0]
     except np.linalg.LinAlgError:
         return 0.0
     slack = gamma(n + 2) / (1 - gamma(n + 2)) * float(np.trace(np.abs(S))) * SAFE + TINY

@@ -5,10 +5,12 @@ Nothing here is trusted.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 
+from enumsol.arithmetic.balls import factor_above, lowest_mode
 from enumsol.support.array_types import Floats, Indices, Mask
 from enumsol.support.deadlines import look
 
@@ -31,13 +33,13 @@ _INSIDE, _SHARES = 0.9, 8
 _SHARED, _CHOSEN = 0.5, 0.999
 #: Smallest eigenvalue, relative to H and the mean of the numbers, at which descent may end; and that is any use.
 _ENOUGH, _JUST = 5e-4, 1e-6
-#: Where no descent is tried; where another round is not, nor after so many rounds in a row that each leave more than
-#: this share of what lacks: one often does where the next ones go on.
-_HOPELESS, _FAR, _IN_VAIN, _SLOW = -4.0, -0.5, 2, 0.9
-#: Both where squares count: on blocks worse ones were not mended, or took longer than the tree.
-_HOPELESS_SQUARES, _FAR_SQUARES = -1.0, -0.14
-#: Rounds, steps of each, and the weight of H in one by what lacked before it.
-_ROUNDS, _EVALUATIONS, _ABOVE = 16, 15, 1.05
+#: Where no descent is tried; the same where squares count: on blocks worse ones were not mended.
+_HOPELESS, _HOPELESS_SQUARES = -4.0, -1.0
+#: Rounds, steps of each, and the weight of H in one by what lacked before it; after so many rounds in a row that each
+#: leave more than this share of what lacks there is no other.
+_ROUNDS, _EVALUATIONS, _ABOVE, _IN_VAIN, _SLOW = 16, 15, 1.05, 2, 0.9
+#: Nodes whose numbers move, in turn, where there are more than the last of these: more than 16 hardly ever help.
+_MOVING = 16, 32, 64
 #: The objective where M is not definite.
 _BEYOND = 1e10
 
@@ -207,128 +209,197 @@ def _share(rates: Floats, gain: float) -> float:
     return low if low > 0 else s
 
 
+@dataclass(frozen=True)
 class Descent:
-    """Numbers for which the form is definite, by descent on a path.
+    """Numbers for which the form is definite, by descent on a path: of all nodes, or of some while others' are fixed.
 
-    M is Q of (6.9) plus so many times H, the symmetric part of R. -log det M, less what scaling all numbers alike adds,
-    is lowered by a quasi-Newton method from mu = kappa = 1 and nu = 0; the multiple of H begins at what makes M
-    definite, and falls with what Q lacks relative to H. The variables are the logarithms of mu and kappa, and the
-    artanh of nu F / mu. Where theta may be chosen it is the least in size that these allow.
+    M is Q of (6.9) plus so many times H, the symmetric part of R, on a basis of changes of x. -log det M, less what
+    scaling all numbers alike adds, is lowered by a quasi-Newton method from mu = kappa = 1 and nu = 0; the multiple of
+    H begins at what makes M definite, and falls with what Q lacks relative to H. The variables are the logarithms of mu
+    and kappa, and the artanh of nu F / mu. Where theta may be chosen it is the least in size that these allow.
 
-    Parameters
+    Attributes
     ----------
-    R : (k, k) array, its symmetric part positive definite
     nodes : Nodes, none of them wide
-    spare : (2, m) array, optional
-        The squares of the first m components of R d count, times mu times the first and nu times the second of these.
-
-    Raises
-    ------
-    numpy.linalg.LinAlgError
-        The symmetric part of R is not positive definite.
+        Those whose numbers are sought.
+    spare : (2, m) array or None
+        The squares of their w_n count, times mu times the first and nu times the second of these.
+    x, w : (c, k) arrays
+        Changes of their components of x, lambda_n first, and of -w, for a basis.
+    H, rest : (k, k) arrays
+        H, and what other nodes add to M.
+    others : int, float
+        How many mu and kappa other nodes have, and their sum.
+    size : int
+        Components of x of all nodes.
     """
 
-    def __init__(self, R: Floats, nodes: Nodes, spare: Floats | None = None) -> None:
-        self._R, self._nodes = R, nodes
-        self._spare = None if spare is None else (spare[0], spare[1, nodes.normal])
-        m, b, chosen = nodes.count, len(nodes.F), ~np.isfinite(nodes.share)
-        self._mu, self._kappa, self._nu = slice(0, m), slice(m, m + b), slice(m + b, m + 2 * b)
-        self._fixed = nodes.F * np.where(chosen, 0.0, nodes.share)
-        self._side = np.where(chosen, np.sign(nodes.slip), 0.0)
-        self._give = _SHARED * nodes.gap / np.where(self._side != 0, np.abs(nodes.slip), np.inf)
-        self._H = 0.5 * (R + R.T)
+    nodes: Nodes
+    spare: Floats | None
+    x: Floats
+    w: Floats
+    H: Floats
+    rest: Floats
+    others: tuple[int, float]
+    size: int
+
+    @classmethod
+    def of(cls, R: Floats, nodes: Nodes, spare: Floats | None = None) -> Descent:
+        """For all nodes of a reduced problem with R, its symmetric part positive definite."""
+        return cls(nodes, spare, np.eye(len(R)), R, 0.5 * (R + R.T), np.zeros_like(R), (0, 0.0), len(R))
 
     def numbers(self) -> Floats | None:
-        """mu, kappa, nu, theta / F and tau as a proof has them, or None."""
-        z = np.zeros(self._nu.stop)
-        if self._spare is not None:
+        """mu, kappa, nu, theta / F and tau as a proof has them, or None.
+
+        With many nodes only those move where x is largest in what lacks most.
+
+        Raises
+        ------
+        numpy.linalg.LinAlgError
+            H is not positive definite.
+        """
+        mu, _, nu = self._parts
+        z, hopeless = np.zeros(nu.stop), _HOPELESS
+        if self.spare is not None:
             # what mu begins with where squares count
-            z[self._mu] = np.log(3.0)
-        lowest, far = (_HOPELESS, _FAR) if self._spare is None else (_HOPELESS_SQUARES, _FAR_SQUARES)
-        least, vain = self._least(z), 0
-        for _ in range(_ROUNDS):
-            if least > _ENOUGH or least < lowest or vain == _IN_VAIN:
+            z[mu], hopeless = np.log(3.0), _HOPELESS_SQUARES
+        least, mode = self._least(z)
+        for many in _MOVING if self.nodes.count > _MOVING[-1] else (self.nodes.count,):
+            if least > _ENOUGH or least < hopeless:
                 break
-            before, lowest = least, far
-            z = self._lowered(z, _ABOVE * max(-before, 0.0) + _ENOUGH)
-            least = self._least(z)
-            vain = vain + 1 if least < _SLOW * before else 0
+            part, places = self._some(z, least, mode, many)
+            z[places] = part._followed(z[places], least)
+            least, mode = self._least(z)
         return self._as_written(z) if least > _JUST else None
 
-    def _lowered(self, z: Floats, weight: float) -> Floats:
+    def _followed(self, z: Floats, least: float) -> Floats:
+        """Numbers at the end of the path."""
         from scipy.optimize import minimize  # not for problems that need no numbers
 
-        options = {"maxiter": _EVALUATIONS, "maxfun": _EVALUATIONS, "maxcor": _EVALUATIONS}
-        found = minimize(self._objective, z, args=(weight,), jac=True, method="L-BFGS-B", options=options)
-        return np.asarray(found.x)
+        options, vain = {"maxiter": _EVALUATIONS, "maxfun": _EVALUATIONS, "maxcor": _EVALUATIONS}, 0
+        for _ in range(_ROUNDS):
+            if least > _ENOUGH or vain == _IN_VAIN:
+                break
+            weight, before = _ABOVE * max(-least, 0.0) + _ENOUGH, least
+            z = minimize(self._objective, z, args=(weight,), jac=True, method="L-BFGS-B", options=options).x
+            least = self._least(z)[0]
+            vain = vain + 1 if least < _SLOW * before else 0
+        return z
+
+    def _some(self, z: Floats, least: float, mode: Floats, many: int) -> tuple[Descent, Indices]:
+        """The descent of some nodes' numbers, and their places in z.
+
+        With them M changes by their components of x times these and those of w only: log det M on a basis.
+        """
+        nodes, m, form = self.nodes, self.nodes.count, self._form(z)
+        if many == m:
+            return self, np.arange(len(z))
+        size = mode[:m] ** 2
+        size[nodes.normal] += mode[nodes.tangential] ** 2
+        some = np.sort(np.argsort(size)[-many:])
+        rubs = np.flatnonzero(np.isin(nodes.normal, some))
+        rows, places = np.append(some, nodes.tangential[rubs]), np.append(some, m + rubs)
+        kept = np.delete(z[: self._parts[1].stop], places)
+        weight = (_ABOVE * max(-least, 0.0) + _ENOUGH) * self._mean(z)
+        turned = np.linalg.solve(form + weight * self.H, np.concatenate([self.x[rows], self.w[rows]]).T)
+        basis = np.linalg.qr(turned)[0]
+        own = replace(
+            nodes,
+            count=many,
+            normal=np.searchsorted(some, nodes.normal[rubs]),
+            tangential=many + np.arange(len(rubs)),
+            **{name: getattr(nodes, name)[rubs] for name in ("F", "share", "wide", "gap", "slip")},
+        )
+        part = replace(
+            self,
+            nodes=own,
+            spare=None if self.spare is None else self.spare[:, some],
+            x=basis[rows],
+            w=self.w[rows] @ basis,
+            H=basis.T @ self.H @ basis,
+            rest=np.zeros((basis.shape[1],) * 2),
+            others=(len(kept), float(np.sum(np.exp(kept)))),
+        )
+        places = np.append(places, m + len(nodes.F) + rubs)
+        return replace(part, rest=basis.T @ form @ basis - part._form(z[places])), places
+
+    @cached_property
+    def _parts(self) -> tuple[slice, slice, slice]:
+        """Places of mu, kappa and nu."""
+        m, b = self.nodes.count, len(self.nodes.F)
+        return slice(0, m), slice(m, m + b), slice(m + b, m + 2 * b)
+
+    @cached_property
+    def _chosen(self) -> tuple[Floats, Floats, Floats]:
+        """Theta, or zero where it is chosen; the side where it is; and what a gap gives there."""
+        nodes, chosen = self.nodes, ~np.isfinite(self.nodes.share)
+        side = np.where(chosen, np.sign(nodes.slip), 0.0)
+        give = _SHARED * nodes.gap / np.where(side != 0, np.abs(nodes.slip), np.inf)
+        return nodes.F * np.where(chosen, 0.0, nodes.share), side, give
 
     def _split(self, z: Floats) -> tuple[Floats, Floats, Floats, Floats, Floats]:
         """mu, kappa, nu, kappa theta, and the side of theta where it is chosen and not zero."""
-        nodes = self._nodes
-        mu, kappa = np.exp(z[self._mu]), np.exp(z[self._kappa])
-        nu = mu[nodes.normal] / nodes.F * np.tanh(z[self._nu])
+        nodes, (fixed, sides, give) = self.nodes, self._chosen
+        mu, kappa = (np.exp(z[part]) for part in self._parts[:2])
+        nu = mu[nodes.normal] / nodes.F * np.tanh(z[self._parts[2]])
         # (mu +- nu F) |w_n| >= kappa (F -+ theta) |w_t|
-        size = nodes.F * kappa - self._give * (mu[nodes.normal] + self._side * nodes.F * nu)
-        side = np.where(size > 0, self._side, 0.0)
-        return mu, kappa, nu, np.where(side != 0, side * size, kappa * self._fixed), side
+        size = nodes.F * kappa - give * (mu[nodes.normal] + sides * nodes.F * nu)
+        side = np.where(size > 0, sides, 0.0)
+        return mu, kappa, nu, np.where(side != 0, side * size, kappa * fixed), side
 
-    def _form(self, mu: Floats, kappa: Floats, nu: Floats, rho: Floats) -> Floats:
-        R, n, t = self._R, self._nodes.normal, self._nodes.tangential
-        form = np.zeros_like(R)
-        form[: len(mu)] = mu[:, None] * R[: len(mu)]
-        form[n] -= rho[:, None] * R[t]
-        form[t] = nu[:, None] * R[n] + kappa[:, None] * R[t]
-        form = 0.5 * (form + form.T)
-        if self._spare is not None:
-            strength = mu * self._spare[0]
-            strength[n] += nu * self._spare[1]
-            # |nu F| <= mu: strengths are not negative but by rounding
-            root = np.sqrt(np.maximum(strength, 0.0))[:, None] * R[: len(mu)]
-            form += root.T @ root
-        return form
+    def _mean(self, z: Floats) -> float:
+        """The mean of all mu and kappa."""
+        own, (count, total) = z[: self._parts[1].stop], self.others
+        return float(total + np.sum(np.exp(own))) / (count + len(own))
 
-    def _least(self, z: Floats) -> float:
-        """The smallest eigenvalue relative to H, and to the mean of mu and kappa."""
-        from scipy.linalg import eigh  # not for problems that need no numbers
-
+    def _form(self, z: Floats) -> Floats:
+        x, w, n, t = self.x, self.w, self.nodes.normal, self.nodes.tangential
         mu, kappa, nu, rho, _ = self._split(z)
-        form = self._form(mu, kappa, nu, rho)
-        least = eigh(form, self._H, eigvals_only=True, subset_by_index=[0, 0], check_finite=False)[0]
-        return float(least / np.mean(np.concatenate([mu, kappa])))
+        form = np.zeros_like(w)
+        form[: len(mu)] = mu[:, None] * w[: len(mu)]
+        form[n] -= rho[:, None] * w[t]
+        form[t] = nu[:, None] * w[n] + kappa[:, None] * w[t]
+        form = form if len(x) == self.size else x.T @ form
+        form = 0.5 * (form + form.T) + self.rest
+        if self.spare is not None:
+            strength = mu * self.spare[0]
+            strength[n] += nu * self.spare[1, n]
+            # |nu F| <= mu: strengths are not negative but by rounding
+            root = np.sqrt(np.maximum(strength, 0.0))[:, None] * w[: len(mu)]
+            form += root.T @ root
+        return np.asarray(form)
+
+    def _least(self, z: Floats) -> tuple[float, Floats]:
+        """The smallest eigenvalue relative to H, and to the mean of mu and kappa, and its eigenvector."""
+        return lowest_mode(self._form(z) / self._mean(z), self.H, -_HOPELESS)
 
     def _objective(self, z: Floats, weight: float) -> tuple[float, Floats]:
-        from scipy.linalg.lapack import dpotrf, dpotri, dtrtrs  # not for problems that need no numbers
-
         look()
-        R, H, n, t, F = self._R, self._H, self._nodes.normal, self._nodes.tangential, self._nodes.F
-        mu, kappa, nu, rho, side = self._split(z)
-        mean, count = np.mean(np.concatenate([mu, kappa])), len(mu) + len(kappa)
-        # M is symmetric: its transpose is what LAPACK overwrites without a copy
-        L, fails = dpotrf((self._form(mu, kappa, nu, rho) + weight * mean * H).T, lower=1, clean=0, overwrite_a=1)
-        if fails:
+        x, w, H, n, t, F = self.x, self.w, self.H, self.nodes.normal, self.nodes.tangential, self.nodes.F
+        mu, kappa, nu, _, side = self._split(z)
+        (fixed, _, give), mean = self._chosen, self._mean(z)
+        M = self._form(z) + weight * mean * H
+        L = factor_above(M)
+        if L is None:
             return _BEYOND, np.zeros_like(z)
-        log_det = 2.0 * float(np.sum(np.log(np.diag(L))))
-        if self._spare is not None:
-            half = dtrtrs(L, R[: len(mu)].T, lower=1)[0]
-            squares = np.sum(half * half, axis=0)
-        P = np.tril(dpotri(L, lower=1, overwrite_c=1)[0])
-        P += np.tril(P, -1).T
+        P = np.linalg.inv(M)
+        Px, Pw = x @ P, w @ P
         # slopes of -log det M, which are -tr(P dM)
-        by_mu, by_kappa, by_nu = (-np.sum(R[i] * P[j], axis=1) for i, j in ((slice(len(mu)),) * 2, (t, t), (n, t)))
-        if self._spare is not None:
-            by_mu, by_nu = by_mu - self._spare[0] * squares, by_nu - self._spare[1] * squares[n]
-        by_rho = np.sum(R[t] * P[n], axis=1)
-        by_kappa += by_rho * np.where(side != 0, side * F, self._fixed)
-        by_mu[n] -= by_rho * side * self._give
-        by_nu -= by_rho * abs(side) * self._give * F
-        common = (len(R) / mean - weight * float(np.sum(H * P))) / count
+        by_mu, by_kappa, by_nu = (-np.sum(w[i] * Px[j], axis=1) for i, j in ((slice(len(mu)),) * 2, (t, t), (n, t)))
+        if self.spare is not None:
+            squares = np.sum((w * Pw)[: len(mu)], axis=1)
+            by_mu, by_nu = by_mu - self.spare[0] * squares, by_nu - self.spare[1, n] * squares[n]
+        by_rho = np.sum(w[t] * Px[n], axis=1)
+        by_kappa += by_rho * np.where(side != 0, side * F, fixed)
+        by_mu[n] -= by_rho * side * give
+        by_nu -= by_rho * abs(side) * give * F
+        common = (self.size / mean - weight * float(np.sum(H * P))) / (self.others[0] + len(mu) + len(kappa))
         slope = np.concatenate([(by_mu + common) * mu, (by_kappa + common) * kappa, by_nu * mu[n] / F])
         slope[n] += by_nu * nu
-        slope[self._nu] *= 1.0 - np.tanh(z[self._nu]) ** 2
-        return float(len(R) * np.log(mean) - log_det), slope
+        slope[self._parts[2]] *= 1.0 - np.tanh(z[self._parts[2]]) ** 2
+        return float(self.size * np.log(mean) - 2.0 * np.sum(np.log(np.diag(L)))), slope
 
     def _as_written(self, z: Floats) -> Floats:
         mu, kappa, nu, rho, _ = self._split(z)
-        share = np.clip(rho / (kappa * self._nodes.F), -1.0, 1.0)
-        mean = np.mean(np.concatenate([mu, kappa]))
+        share, mean = np.clip(rho / (kappa * self.nodes.F), -1.0, 1.0), self._mean(z)
         return np.concatenate([mu / mean, kappa / mean, nu / mean, share, np.zeros_like(share)])

@@ -106,7 +106,11 @@ class Closer(TreeCloser):
         """Proposal of the only solution of the whole problem; takes note of where it is degenerate."""
         system, p = self._system, self._system.p
         codes, exactly = (UNDECIDED,) * p, self._certifier.exactly
-        proposal = propose(system, codes, (np.zeros(2 * p), system.g), exactly=exactly, sought=sought)
+        none: Floats = np.zeros(2 * p)
+        # blocks with many nodes mostly stick: one to 16 steps from w = 0, where a third of the tries from w = g fail
+        stuck = np.asarray(np.linalg.solve(system.S, system.g), dtype=np.float64)
+        near: Point = (none, system.g) if p < _FEW else (stuck, none)
+        proposal = propose(system, codes, near, exactly=exactly, sought=sought)
         # with many contact nodes the solution is sought along a path, too
         if proposal is None and (p >= 24 or sought is WeightSource.DESCENT):
             proposal = propose(system, codes, None, exactly=exactly, sought=sought)

@@ -102,11 +102,13 @@ class Lone:
         b, count = len(self.nodes.F), self.nodes.count
         share = self.nodes.first
         normal, tangential = self.R[:count], self.R[count:]
-        vanishing = np.concatenate([self.touching, self.stuck]) * _STIFF
-        fixed = self.R.T @ (vanishing[:, None] * self.R)
+        # a product of a matrix with itself takes half of the time
+        vanishing = self.R[np.concatenate([self.touching, self.stuck])]
+        fixed = _STIFF * (vanishing.T @ vanishing)
         fixed[count:] += tangential
         fixed[self.nodes.normal] -= (share * self.nodes.F)[:, None] * tangential
-        by_mu = normal.T @ (self.spare[0][:, None] * normal)
+        costs = np.sqrt(self.spare[0])[:, None] * normal
+        by_mu = costs.T @ costs
         by_mu[:count] += normal
         # what loaded nodes lose by a gap grows with mu, the share of the slip falls
         for mu in (1.0, 3.0, 10.0):
@@ -116,7 +118,7 @@ class Lone:
         if not descent:
             return None
         try:
-            return Descent(self.R, self.nodes, self.spare).numbers()
+            return Descent.of(self.R, self.nodes, self.spare).numbers()
         except np.linalg.LinAlgError:
             return None
 

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from enumsol.arithmetic.balls import factor_above
 from enumsol.model.statuses import FRICTIONLESS, OPEN, SLIP_MINUS, SLIP_PLUS, STICK
 from enumsol.search.definite import DEFINITE, AnalyticCentres, Descent, Nodes
 from enumsol.support.deadlines import look
@@ -232,13 +233,15 @@ def weights_of(R: Floats, nodes: Nodes, sought: WeightSource = WeightSource.CENT
     form -= 0.5 * (T[wide] / tau[wide, None]).T @ T[wide]
     form[n, n] -= 0.5 * tau
     try:
-        if np.linalg.eigvalsh(0.5 * (form + form.T))[0] > DEFINITE:
+        # LAPACK may factorize what is not a number
+        if np.all(np.isfinite(form)) and factor_above(0.5 * (form + form.T), DEFINITE) is not None:
             return np.concatenate([np.ones(nodes.count + b), np.zeros(b), share, tau])
         if sought is WeightSource.PLAIN:
             return None
         with np.errstate(all="ignore"):
-            search = Descent if sought is WeightSource.DESCENT and not len(wide) else AnalyticCentres
-            return search(R, nodes).numbers()
+            if sought is WeightSource.DESCENT and not len(wide):
+                return Descent.of(R, nodes).numbers()
+            return AnalyticCentres(R, nodes).numbers()
     except np.linalg.LinAlgError:
         return None
 

@@ -7,6 +7,7 @@ import pytest
 from effort import some
 from flint import fmpq, fmpq_mat
 
+from enumsol.search import definite
 from enumsol.search.definite import Descent, Nodes
 from enumsol.search.reduction import WeightSource, weights_of
 
@@ -197,7 +198,7 @@ def test_descent_has_the_slope_of_its_objective(chosen):
     loads = rng.uniform(0.1, 0.5, m)
     tangential = np.zeros(m)
     tangential[normal] = 0.5 * F * loads[normal]
-    descent = Descent(R, nodes, np.stack([loads, tangential]))
+    descent = Descent.of(R, nodes, np.stack([loads, tangential]))
     z = 0.3 * rng.normal(size=m + 6)
     weight, step = 4.0, 1e-5
     slope = descent._objective(z, weight)[1]
@@ -211,4 +212,44 @@ def test_descent_has_the_slope_of_its_objective(chosen):
     strength[normal] += nu * tangential[normal]
     M = D @ R + R[:m].T @ np.diag(strength) @ R[:m]
     relative = np.linalg.eigvals(np.linalg.solve(R + R.T, M + M.T))
-    assert descent._least(z) == pytest.approx(np.min(relative.real) / np.mean(np.concatenate([mu, kappa])), abs=1e-9)
+    assert descent._least(z)[0] == pytest.approx(np.min(relative.real) / np.mean(np.concatenate([mu, kappa])), abs=1e-9)
+
+
+def sticking(rng, m, F, share):
+    """A matrix that is definite, and nodes that stick."""
+    X = rng.normal(size=(2 * m, 2 * m))
+    R = np.exp(-np.abs(np.subtract.outer(np.arange(2 * m), np.arange(2 * m))) / 2.0) + 0.2 / m * X @ X.T
+    none, i = np.zeros(m), np.arange(m)
+    return R, Nodes(m, i, m + i, F, share, none > 0, none, none)
+
+
+def test_some_nodes_descend_as_all_do():
+    # numbers are exchanged: the mean stays, by which H is multiplied outside of the basis too
+    rng = np.random.default_rng(3)
+    R, nodes = sticking(rng, 8, rng.uniform(0.2, 1.0, 8), rng.uniform(-1, 1, 8))
+    descent = Descent.of(R, nodes, rng.uniform(0.0, 0.4, (2, 8)) * [[1.0], [0.1]])
+    z = 0.2 * rng.normal(size=24)
+    least, mode = descent._least(z)
+    part, places = descent._some(z, least, mode, 3)
+    weight = definite._ABOVE * max(-least, 0.0) + definite._ENOUGH
+    moved = z.copy()
+    moved[places] = z[places][[1, 2, 0, 4, 3, 5, 8, 6, 7]]
+    change = descent._objective(moved, weight)[0] - descent._objective(z, weight)[0]
+    assert abs(change) > 1e-3
+    assert part._objective(moved[places], weight)[0] - part._objective(z[places], weight)[0] == pytest.approx(change)
+
+
+def test_few_of_many_nodes_move():
+    # with mu = kappa = 1 what lacks is at three nodes
+    m, rng = 80, np.random.default_rng(4)
+    F, share = np.ones(m), rng.uniform(-0.5, 0.5, m)
+    F[[5, 40, 79]], share[[5, 40, 79]] = 4.0, 0.9
+    R, nodes = sticking(rng, m, F, share)
+    assert weights_of(R, nodes, WeightSource.PLAIN) is None
+    numbers = weights_of(R, nodes, WeightSource.DESCENT)
+    mu, kappa, nu, theta, _ = numbers.reshape(5, m)
+    D = np.block([[np.diag(mu), np.diag(nu)], [-np.diag(kappa * theta * F), np.diag(kappa)]])
+    assert np.linalg.eigvalsh(D.T @ R + R @ D)[0] > 0
+    assert np.all(np.abs(nu) * F <= mu)
+    assert theta == pytest.approx(share)
+    assert np.sum(np.isclose(mu, np.median(mu), rtol=1e-9)) >= m - definite._MOVING[-1]

@@ -122,7 +122,7 @@ def test_slopes_of_the_descent(seed, squares):
     rng = np.random.default_rng(seed)
     S = fe_compliance(rng, 4)
     spare = rng.uniform(0.0, 0.5, (2, 4)) if squares else None
-    sought = definite.Descent(S / np.mean(np.diag(S)), nodes_of(rng, 4, rng.random(4) < 0.5), spare)
+    sought = definite.Descent.of(S / np.mean(np.diag(S)), nodes_of(rng, 4, rng.random(4) < 0.5), spare)
     z, weight = 0.1 * rng.normal(size=12), 30.0
     assert sought._objective(z, weight)[0] < definite._BEYOND
     slopes = [sought._objective(z + h, weight)[0] - sought._objective(z - h, weight)[0] for h in 1e-5 * np.eye(12)]
@@ -137,7 +137,7 @@ def test_what_descent_finds_is_definite(seed):
     for _ in range(20):
         S = fe_compliance(rng, 4)
         nodes = nodes_of(rng, 4, rng.random(4) < 0.5)
-        numbers = definite.Descent(S, nodes).numbers()
+        numbers = definite.Descent.of(S, nodes).numbers()
         if numbers is None:
             continue
         found += 1
