@@ -10,7 +10,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 from itertools import product
-from typing import TYPE_CHECKING, Generic, NamedTuple, TypeVar
+from typing import TYPE_CHECKING, Any, Generic, NamedTuple, TypeVar
 
 import numpy as np
 
@@ -225,8 +225,7 @@ def _closer(system: EnclosedSystem, selection: Selection, found: _Solved) -> Bal
 
 
 def _conditions(system: EnclosedSystem, codes: Sequence[int], force: Ball, w: Ball, sign: int) -> VerifiedSelection:
-    kinds, nodes = np.array([(kind, i) for i, code in enumerate(codes) for kind in CONDITIONS[code][1]]).T
-    slack = row_values(force, w, system.balls[2])[kinds, nodes]
+    slack = conditions_of(codes, force, w, system.balls[2])
     if not len(system.reach):
         return VerifiedSelection(force, w, slack, sign)
     # the unknowns beyond the contact forces are -q, by which the columns of the border change sign
@@ -236,6 +235,12 @@ def _conditions(system: EnclosedSystem, codes: Sequence[int], force: Ball, w: Ba
         slack = Ball.joined(slack, reach - rigid, reach + rigid)
     sign = -sign if len(system.reach) % 2 else sign
     return VerifiedSelection(force[:contact], w[:contact], slack, sign, rigid)
+
+
+def conditions_of(codes: Sequence[int], force: Any, w: Any, F: Any) -> Any:
+    """Values of the inequalities of a complete selection, node by node, as balls or numbers of any kind."""
+    kinds, nodes = np.array([(kind, i) for i, code in enumerate(codes) for kind in CONDITIONS[code][1]]).T
+    return row_values(force, w, F)[kinds, nodes]
 
 
 #: Nodes between stick and slip at most: there are twice as many selections for each.
