@@ -5,11 +5,11 @@ S and g as computed, with the bounds of their errors, are in ``condensation.prod
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 from fractions import Fraction
 from functools import cached_property
-from typing import Any, ClassVar, Self
+from typing import Any, ClassVar, Self, TypeVar
 
 import numpy as np
 import scipy.sparse as sp
@@ -19,8 +19,9 @@ from enumsol.arithmetic.balls import (
     TINY,
     UNIT,
     Ball,
-    dense_eigenvalue_bound,
     gamma,
+    least_eigenvalue,
+    nearest,
     sparse_eigenvalue_bound,
     upper_norm,
 )
@@ -31,6 +32,8 @@ from enumsol.support.arguments import alpha_value
 from enumsol.support.array_types import AlphaLike, Floats, Mask
 from enumsol.support.deadlines import attended
 from enumsol.support.immutable import Sealed
+
+_Value = TypeVar("_Value")
 
 
 class NotEnclosedError(EnumsolError):
@@ -98,10 +101,9 @@ class CondensedEnclosure(Sealed):
         """B A^-1 f(alpha), where the contact nodes would be without contact, shape (2p,) [length]."""
         if self.free is None:
             raise AssertionError(_PART)
-        value, slack = float_at(alpha)
         with np.errstate(over="ignore", invalid="ignore"):
-            moved = Ball(np.array(value), np.array(slack)) * Ball(self.g1, self.g1_rad) + Ball(*self.free)
-        if not np.all(np.isfinite(moved.mid)) or not np.all(np.isfinite(moved.rad)):
+            moved = nearest([alpha])[0] * Ball(self.g1, self.g1_rad) + Ball(*self.free)
+        if not moved.finite:
             raise NotEnclosedError(_OVERFLOW)
         return moved
 
@@ -153,11 +155,9 @@ class CondensedEnclosure(Sealed):
     def at(self, alpha: AlphaLike, force: Floats, length: Floats) -> EnclosedSystem:
         """The enclosed system of a 2D problem at one alpha, in units given by powers of two (see ScaledSystem)."""
         a = alpha if isinstance(alpha, Fraction) else Fraction(alpha_value(alpha))
-        exact = exactly_at(a, *self.problem.affine_friction)
-        F, inexact = nearest_floats(exact)
-        F_rad = np.where(inexact, 2 * UNIT * F + TINY, 0.0)
+        F = coefficients(exactly_at(a, *self.problem.affine_friction))
         S, S_rad, g, g_rad = self.in_units(a, force, length)
-        return EnclosedSystem(S, S_rad, g, g_rad, F, F_rad, rows=RigidRows.of(self.problem, a, force, length))
+        return EnclosedSystem(S, S_rad, g, g_rad, F.mid, F.rad, rows=RigidRows.of(self.problem, a, force, length))
 
     def constant_load(self, side: float) -> CondensedEnclosure:
         """Enclosure with g = side g1 at every alpha, ``side`` 1 or -1: what solutions are beside a zero of g."""
@@ -193,7 +193,8 @@ class CondensedEnclosure(Sealed):
         """
         if np.any(np.frexp(length)[0] != 0.5):
             raise AssertionError(_POWERS)
-        value, slack = float_at(alpha)
+        near = nearest([alpha])
+        value, slack = float(near.mid[0]), float(near.rad[0])
         with np.errstate(over="ignore", invalid="ignore"):
             g = self.g0 + value * self.g1
             size = np.abs(value * self.g1)
@@ -218,37 +219,20 @@ _PART = "these balls are not those of a whole problem"
 _POWERS = "units of force and length must be powers of two"
 
 
-def nearest_floats(exact: Sequence[Fraction]) -> tuple[Floats, Mask]:
-    """Friction coefficients in floats, and which of them are rounded.
+def coefficients(exact: Sequence[Fraction]) -> Ball:
+    """Friction coefficients as balls.
 
     Raises
     ------
     NotEnclosedError
         One over- or underflows.
     """
-    try:
-        F = np.array([float(x) for x in exact])
-    except OverflowError:
-        raise NotEnclosedError(_OVERFLOW) from None
-    inexact = np.array([Fraction(x) != y for x, y in zip(F.tolist(), exact, strict=True)])
-    if np.any(inexact & (F == 0)):
+    F = nearest(exact)
+    if not F.finite:
+        raise NotEnclosedError(_OVERFLOW)
+    if np.any((F.rad > 0) & (F.mid == 0)):
         raise NotEnclosedError("a friction coefficient underflows float64")
-    return F, inexact
-
-
-def float_at(alpha: Fraction) -> tuple[float, float]:
-    """The float next to alpha, and how far it may be away.
-
-    Raises
-    ------
-    NotEnclosedError
-        There is none.
-    """
-    try:
-        value = float(alpha)
-    except OverflowError:
-        raise NotEnclosedError(_OVERFLOW) from None
-    return value, 0.0 if Fraction(value) == alpha else 2 * UNIT * abs(value) + TINY
+    return F
 
 
 def _displaced(problem: ProblemData, products: Products, rad: Floats) -> tuple[Floats, ...]:
@@ -330,9 +314,8 @@ class RigidRows:
         rows = cls.along(problem, force, length)
         if not np.any(rows.slope.size):
             return rows
-        value, slack = float_at(alpha)
         with np.errstate(over="ignore", invalid="ignore"):
-            h = rows.h + Ball(np.array(value), np.array(slack)) * rows.slope
+            h = rows.h + nearest([alpha])[0] * rows.slope
         if not h.finite:
             raise NotEnclosedError(_RIGID_OVERFLOW)
         return replace(rows, h=h)
@@ -366,6 +349,18 @@ class RigidRows:
         return cls(rows, loads[0], loads[1] if len(loads) > 1 else Ball.exact(np.zeros(len(unit))), unit, reach)
 
 
+def of_compliance(compute: Callable[[Any], _Value]) -> cached_property[_Value]:
+    """A value that follows from S alone, and is that of another system with the same S where one is known."""
+    name = compute.__name__
+
+    def value(system: EnclosedSystem) -> _Value:
+        found: _Value = compute(system) if system.same is None else getattr(system.same, name)
+        return found
+
+    value.__doc__ = compute.__doc__
+    return cached_property(value)
+
+
 #: Stands for those of a body that is held, of any number of contact forces.
 _NO_ROWS = RigidRows.none(0)
 
@@ -382,6 +377,8 @@ class EnclosedSystem:
     g, g_rad : (2p,) arrays
     F, F_rad : (p,) arrays
     rows : RigidRows, by default none
+    same : EnclosedSystem or None
+        One with the same S, from which comes what follows from that alone.
     tangents : int
         Tangential directions of a contact node: 1 in 2D, 2 in 3D.
     """
@@ -395,6 +392,7 @@ class EnclosedSystem:
     F: Floats
     F_rad: Floats
     rows: RigidRows = field(kw_only=True, default=_NO_ROWS)
+    same: EnclosedSystem | None = field(kw_only=True, default=None, repr=False)
 
     def __post_init__(self) -> None:
         if self.rows is _NO_ROWS:
@@ -421,7 +419,7 @@ class EnclosedSystem:
         )
         return Ball(mid, rad), Ball.joined(Ball(self.g, self.g_rad), self.rows.h), Ball(self.F, self.F_rad)
 
-    @cached_property
+    @of_compliance
     def smallest_eigenvalue(self) -> float:
         """Proven lower bound on the smallest eigenvalue of every S in the enclosure.
 
@@ -431,7 +429,7 @@ class EnclosedSystem:
             S is not proven positive definite.
         """
         with np.errstate(over="ignore", invalid="ignore"):
-            bound = (dense_eigenvalue_bound(self.S) - float(upper_norm(self.S_rad))) / SAFE
+            bound = least_eigenvalue(Ball(self.S, self.S_rad))
         if not bound > 0:
             raise NotEnclosedError("the condensed compliance S is positive definite only within rounding")
         return bound
@@ -486,12 +484,12 @@ class EnclosedSystem:
         G = self.rows.G.mid
         return np.asarray(np.linalg.pinv(G @ self.inverse @ G.T, hermitian=True))
 
-    @cached_property
+    @of_compliance
     def inverse(self) -> Floats:
         """Approximate inverse of S; no claim rests on its accuracy."""
         return np.asarray(np.linalg.inv(self.S))
 
-    @cached_property
+    @of_compliance
     def form_error(self) -> float:
         """kappa with |fl(x'S x) - x'S x| <= kappa ||x||^2 for every S in the enclosure.
 

@@ -12,14 +12,14 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from enumsol.arithmetic.balls import SAFE, TINY, UNIT, Ball, gamma, upper_norm
+from enumsol.arithmetic.balls import SAFE, TINY, UNIT, Ball, gamma, nearest, upper_norm
 from enumsol.condensation.condensed import LARGEST_FRICTION, cholesky_factor, load_unit, node_units
 from enumsol.condensation.data import exactly_at
-from enumsol.condensation.enclosure import EnclosedSystem, NotEnclosedError, RigidRows, nearest_floats
+from enumsol.condensation.enclosure import EnclosedSystem, NotEnclosedError, RigidRows, coefficients, of_compliance
 from enumsol.errors import InvalidProblemError
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Sequence
+    from collections.abc import Iterator
 
     from enumsol.condensation.data import ProblemData
     from enumsol.condensation.enclosure import CondensedEnclosure
@@ -195,23 +195,39 @@ class PieceTurn:
 
 @dataclass(frozen=True)
 class EnclosedSpace(EnclosedSystem, FrictionUnits):
-    """A SpaceSystem as balls: S, g and F for the data as given.
+    """A SpaceSystem as balls: S, g and F for the data as given, at one alpha or for all of a piece.
+
+    Over a piece the variables do not depend on alpha: lambda_t is F tau with one F for the whole piece, so that S is
+    the same everywhere and |tau| is at most the radius of a disc times lambda_n. g, h and these radii are affine in
+    alpha; here they are the balls of the whole piece (theory, sections 12.9 and 14.14). In ``turn`` g is bordered by h.
 
     Attributes
     ----------
     tau, unit : arrays
         As in SpaceSystem.
+    disc : Ball of shape (p,), or None
+        Over a piece, or at a point of one: F(alpha) over F for all its alpha (see ``discs``).
+    turn : PieceTurn or None
+        Change of g and discs along a piece of alpha; None at one alpha.
     """
 
     tangents = 2
 
     tau: Indices
     unit: Floats
+    disc: Ball | None = field(kw_only=True, default=None)
+    turn: PieceTurn | None = field(kw_only=True, default=None)
 
     @property
     def discs(self) -> Ball:
-        """Radii of the discs of tau over lambda_n, shape (p,): one, but over a piece of alpha (see PieceSpace)."""
-        return Ball.exact(np.ones(len(self.F)))
+        """Radii of the discs of tau over lambda_n, shape (p,): one, but over a piece of alpha."""
+        return Ball.exact(np.ones(len(self.F))) if self.disc is None else self.disc
+
+    @property
+    def end_discs(self) -> tuple[Ball, ...]:
+        """``discs`` at both ends of the piece, between which they are affine in alpha; once where there is no piece."""
+        turn = self.turn
+        return (self.discs,) if turn is None else (turn.disc - turn.disc_turn, turn.disc + turn.disc_turn)
 
     @cached_property
     def inverse_friction(self) -> Ball:
@@ -219,27 +235,26 @@ class EnclosedSpace(EnclosedSystem, FrictionUnits):
         F = np.where(self.F > 0, self.F, 1.0)
         return Ball(1.0 / F, (2.0 * self.F_rad / F + 2 * UNIT) / F * SAFE)
 
-    @property
-    def end_discs(self) -> tuple[Ball, ...]:
-        """``discs`` at both ends of the piece, between which they are affine in alpha; once where there is no piece."""
-        return (self.discs,)
-
     @cached_property
     def largest_discs(self) -> Floats:
         """Upper bounds of ``discs``."""
         return np.where(self.discs.rad > 0, self.discs.size, self.discs.mid)
 
-    @property
-    def turn(self) -> PieceTurn | None:
-        """Change of g and discs along a piece of alpha; None at one alpha."""
-        return None
-
     @cached_property
+    def references(self) -> Floats:
+        """F of the first component with friction, exact, (p,): lambda_t of it is F tau; 1 where there is none."""
+        found = np.ones(len(self.tau))
+        for k in (1, 0):
+            has = self.tau[:, k] >= 0
+            found[has] = self.F[has, k] / self.unit[self.tau[has, k]]
+        return found
+
+    @of_compliance
     def largest_norm(self) -> float:
         """Upper bound on the norm of every S in the enclosure."""
         return float(upper_norm(self.S) + upper_norm(self.S_rad)) * SAFE
 
-    @cached_property
+    @of_compliance
     def product_error(self) -> Floats:
         """By how much a computed S y, with the terms of a sum that it is part of, may be off, as a factor of |y|."""
         return np.asarray((gamma(len(self.g) + 4) * np.abs(self.S) + self.S_rad) * SAFE)
@@ -260,84 +275,9 @@ class EnclosedSpace(EnclosedSystem, FrictionUnits):
             Something over- or underflows.
         """
         pairs = zip(*(part.T for part in enclosure.problem.affine_friction), strict=True)
-        exact = [exactly_at(alpha, *pair) for pair in pairs]
-        F, inexact = (np.array(part).T for part in zip(*map(nearest_floats, exact), strict=True))
-        return _enclosed(enclosure, alpha, (force, length), _variables(F, np.where(inexact, 2 * UNIT * F, 0.0)))
-
-
-@dataclass(frozen=True)
-class PieceSpace(EnclosedSpace):
-    """All problems over a piece of alpha, or at a point, as balls, in variables that do not depend on alpha.
-
-    lambda_t is F tau with one F for the whole piece, so that S is the same everywhere and |tau| is at most the radius
-    of a disc times lambda_n. g, h and these radii are affine in alpha; here they are the balls of the whole piece
-    (theory, sections 12.9 and 14.14). In ``turn`` g is bordered by h.
-
-    Attributes
-    ----------
-    disc, disc_rad : (p,) arrays
-        See ``discs``.
-    along : PieceTurn or None
-        See ``turn``.
-    fixed : EnclosedSpace
-        With the same S: what follows from that alone is computed once (see AlphaSpace).
-    """
-
-    disc: Floats
-    disc_rad: Floats
-    along: PieceTurn | None
-    fixed: EnclosedSpace
-
-    @property
-    def turn(self) -> PieceTurn | None:
-        """Change of g and discs along the piece; None over a point."""
-        return self.along
-
-    @property
-    def discs(self) -> Ball:
-        """F(alpha) over F for all alpha of the piece, shape (p,)."""
-        return Ball(self.disc, self.disc_rad)
-
-    @property
-    def end_discs(self) -> tuple[Ball, ...]:
-        """``discs`` at both ends."""
-        if self.along is None:
-            return (self.discs,)
-        return self.along.disc - self.along.disc_turn, self.along.disc + self.along.disc_turn
-
-    @cached_property
-    def references(self) -> Floats:
-        """F of the first component with friction, exact, (p,): lambda_t of it is F tau; 1 where there is none."""
-        found = np.ones(len(self.tau))
-        for k in (1, 0):
-            has = self.tau[:, k] >= 0
-            found[has] = self.F[has, k] / self.unit[self.tau[has, k]]
-        return found
-
-    @property
-    def inverse(self) -> Floats:
-        """Approximate inverse of S; no claim rests on its accuracy."""
-        return self.fixed.inverse
-
-    @property
-    def smallest_eigenvalue(self) -> float:
-        """Proven lower bound on the smallest eigenvalue of every S in the enclosure (see EnclosedSystem)."""
-        return self.fixed.smallest_eigenvalue
-
-    @property
-    def form_error(self) -> float:
-        """By how much a computed x'S x may be off, as a factor of |x|^2."""
-        return self.fixed.form_error
-
-    @property
-    def largest_norm(self) -> float:
-        """Upper bound on the norm of every S in the enclosure."""
-        return self.fixed.largest_norm
-
-    @property
-    def product_error(self) -> Floats:
-        """By how much a computed S y may be off, as a factor of |y|."""
-        return self.fixed.product_error
+        axes = [coefficients(exactly_at(alpha, *pair)) for pair in pairs]
+        F, F_rad = (np.stack(part, axis=1) for part in zip(*((F.mid, F.rad) for F in axes), strict=True))
+        return _enclosed(enclosure, alpha, (force, length), _variables(F, F_rad))
 
 
 @dataclass(frozen=True, eq=False)
@@ -402,9 +342,9 @@ class AlphaSpace:
 
     def discs(self, alpha: Fraction, change: Fraction = Fraction(1)) -> Ball:
         """Coefficients at alpha over F, (p,)."""
-        return _nearest([change * value + alpha * slope for value, slope in self._quotients])
+        return nearest([change * value + alpha * slope for value, slope in self._quotients])
 
-    def at(self, alpha: Fraction) -> PieceSpace:
+    def at(self, alpha: Fraction) -> EnclosedSpace:
         """The data at a point, the last of which are kept."""
         found = self._points.get(alpha)
         if found is None:
@@ -414,10 +354,10 @@ class AlphaSpace:
         return found
 
     @cached_property
-    def _points(self) -> dict[Fraction, PieceSpace]:
+    def _points(self) -> dict[Fraction, EnclosedSpace]:
         return {}
 
-    def over(self, low: Fraction, high: Fraction) -> PieceSpace:
+    def over(self, low: Fraction, high: Fraction) -> EnclosedSpace:
         """Balls for the exact data over a piece, or at a point.
 
         Raises
@@ -432,26 +372,26 @@ class AlphaSpace:
         middle, half = (low + high) / 2, (high - low) / 2
         (weight, rows), length, held = self._rows, np.tile(self.units[1], 3), self.fixed
         g, g_rad = self.enclosure.load_in_units(middle, length)
-        disc, disc_turn = self.discs(middle), self.discs(half, Fraction(0))
+        disc, disc_turn, step = self.discs(middle), self.discs(half, Fraction(0)), nearest([half])[0]
         with np.errstate(over="ignore", invalid="ignore"):
             whole = load = weight * Ball(g, g_rad)[rows]
             along = None
             if half:
                 turn = Ball(self.enclosure.g1 / length, self.enclosure.g1_rad / length * SAFE + TINY)[rows]
-                turn = weight * (turn * Ball(np.array(float(half)), np.array(2 * UNIT * float(half))))
+                turn = weight * (turn * step)
                 whole = Ball(load.mid, (load.rad + turn.size) * SAFE)
                 along = PieceTurn(load, turn, disc, disc_turn)
         if not whole.finite:
             raise NotEnclosedError(_OVERFLOW)
-        rad = (disc.rad + disc_turn.size) * SAFE
-        data = held.S, held.S_rad, whole.mid, whole.rad, held.F, held.F_rad, held.tau, held.unit, disc.mid, rad
         rigid = self._rigid(middle)
         if along is not None:
-            turn = rigid.slope * Ball(np.array(float(half)), np.array(2 * UNIT * float(half)))
+            turn = rigid.slope * step
             turn = Ball(turn.mid, np.where(rigid.slope.size > 0, turn.rad, 0.0))
             along = replace(along, g=Ball.joined(along.g, rigid.h), g_turn=Ball.joined(along.g_turn, turn))
             rigid = replace(rigid, h=Ball(rigid.h.mid, (rigid.h.rad + turn.size) * SAFE))
-        return PieceSpace(*data, along, held, rows=rigid)
+        disc = Ball(disc.mid, (disc.rad + disc_turn.size) * SAFE)
+        of_piece = {"disc": disc, "turn": along, "rows": rigid, "same": held}
+        return replace(held, g=whole.mid, g_rad=whole.rad, **of_piece)
 
     @cached_property
     def moved(self) -> Ball:
@@ -502,13 +442,6 @@ def _enclosed(
     return EnclosedSpace(S, S_rad * SAFE, load.mid, load.rad, *of_friction, rows=own)
 
 
-def _nearest(exact: Sequence[Fraction]) -> Ball:
-    """Balls around the floats next to numbers."""
-    mid = np.array([float(number) for number in exact])
-    same = np.array([Fraction(near) == number for near, number in zip(mid.tolist(), exact, strict=True)], dtype=bool)
-    return Ball(mid, np.where(same, 0.0, UNIT * np.abs(mid) * SAFE + TINY))
-
-
 def node_friction(
     problem: ProblemData,
 ) -> Iterator[tuple[tuple[Fraction, Fraction], tuple[Fraction, Fraction], Fraction]]:
@@ -549,9 +482,8 @@ def _references(problem: ProblemData, alpha: Fraction) -> tuple[Floats, Floats]:
         reference, k = (Fraction(float(at[0])), 0) if at[0] else (Fraction(float(at[1])), 1)
         found[0, i, k] = float(reference)
         if k == 0 and at[1]:
-            exact = reference * ratio
-            found[0, i, 1] = float(exact)
-            found[1, i, 1] = 0.0 if Fraction(float(exact)) == exact else 2 * UNIT * float(exact)
+            other = nearest([reference * ratio])
+            found[0, i, 1], found[1, i, 1] = other.mid[0], other.rad[0]
     return found[0], found[1]
 
 

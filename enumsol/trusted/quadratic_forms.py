@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from enumsol.arithmetic.balls import SAFE, TINY, UNIT, dense_eigenvalue_bound, gamma, upper_norm
+from enumsol.arithmetic.balls import SAFE, TINY, UNIT, Ball, gamma, least_eigenvalue, upper_norm
 from enumsol.trusted.status_rows import CONTACT, OPEN, SLIP_MINUS, SLIP_PLUS, STICK, UNDECIDED
 
 if TYPE_CHECKING:
@@ -91,9 +91,7 @@ class QuadraticForm:
     def smallest_eigenvalue(self) -> float:
         """Proven lower bound on the smallest eigenvalue of every H; not positive when none was found."""
         with np.errstate(over="ignore", invalid="ignore"):
-            if not (np.all(np.isfinite(self.H)) and np.all(np.isfinite(self.H_rad))):
-                return 0.0
-            return float((dense_eigenvalue_bound(self.H) - float(upper_norm(self.H_rad))) / SAFE)
+            return least_eigenvalue(Ball(self.H, self.H_rad))
 
     @cached_property
     def inverse(self) -> Floats:

@@ -20,13 +20,12 @@ import scipy.sparse as sp
 from enumsol.arithmetic.balls import (
     SAFE,
     TINY,
-    UNIT,
     Ball,
-    dense_eigenvalue_bound,
     determinant_sign,
     gamma,
+    least_eigenvalue,
+    nearest,
     solution,
-    upper_norm,
 )
 from enumsol.trusted.status_rows import OPEN, SLIP_MINUS, SLIP_PLUS, STICK
 
@@ -209,7 +208,7 @@ class NoMotion:
         if np.isinf(high):
             slope = None
             if other is not None and beside is not None:
-                slope = (K - other) * _ratio(1, Fraction(low) - Fraction(beside))
+                slope = (K - other) * nearest([1 / (Fraction(low) - Fraction(beside))])[0]
             yield from self._without_end(stiffness, K, slope)
             return
         end = stiffness.at(high)
@@ -218,12 +217,12 @@ class NoMotion:
         if other is None or beside is None:
             if stiffness.increases:
                 yield (K, end - K), (end, None)
-        elif beside < low:
-            above = K + (K - other) * _ratio(Fraction(high) - Fraction(low), Fraction(low) - Fraction(beside)) - end
-            yield (K, None), (end, above)
+            return
+        first, length = Fraction(low), Fraction(high) - Fraction(low)
+        if beside < low:
+            yield (K, None), (end, K + (K - other) * nearest([length / (first - Fraction(beside))])[0] - end)
         else:
-            above = end - (other - end) * _ratio(Fraction(high) - Fraction(low), Fraction(beside) - Fraction(high)) - K
-            yield (K, above), (end, None)
+            yield (K, end - (other - end) * nearest([length / (Fraction(beside) - first - length)])[0] - K), (end, None)
 
     @staticmethod
     def _without_end(stiffness: DynamicStiffness, K: Ball, slope: Ball | None) -> Iterator[tuple[_End, _End]]:
@@ -533,22 +532,13 @@ def _times(K: Ball, right: Ball) -> Ball:
     return Ball(np.asarray(K.mid @ middle), np.asarray(rad * (1.0 + k) * SAFE + TINY))
 
 
-def _ratio(above: Fraction | int, below: Fraction) -> Ball:
-    """A quotient of rationals as a ball that can multiply matrices; one that overflows is not finite."""
-    try:
-        value = float(above / below)
-    except OverflowError:
-        value = np.inf
-    return Ball(np.array(value), np.array(2 * UNIT * abs(value) + TINY))
-
-
 def positive(Q: Ball) -> bool:
     """True if all symmetric matrices in a ball are positive definite."""
     if not Q.finite or np.any(Q.mid.diagonal() <= 0):
         return False
     unit = np.ldexp(1.0, -np.round(0.5 * np.log2(Q.mid.diagonal())).astype(int))
     scale = unit[:, None] * unit
-    return dense_eigenvalue_bound(Q.mid * scale) > float(upper_norm(Q.rad * scale + TINY)) * (1 + 2.0**-40)
+    return least_eigenvalue(Ball(Q.mid * scale, Q.rad * scale * SAFE + TINY)) > 0
 
 
 def left_open(leaves: Sequence[NoMotion]) -> tuple[float, float] | None:

@@ -50,7 +50,7 @@ SHARED = {
     "condensation.enclosure": {
         *("CondensedEnclosure", "EnclosedSystem", "NotEnclosedError", "RigidRows", "enclosure_of", "moved_by_modes")
     },
-    "condensation.space_condensed": {"AlphaSpace", "EnclosedSpace", "PieceSpace", "SpaceSystem"},
+    "condensation.space_condensed": {"AlphaSpace", "EnclosedSpace", "SpaceSystem"},
     "condensation.unloaded": {"never_loaded", "solved", "vanishing_alpha"},
     "trusted.arcs.only_branch": {"branch_references", "only_roots"},
     "trusted.arcs.selection_balls": None,

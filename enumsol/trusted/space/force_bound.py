@@ -10,15 +10,14 @@ from typing import TYPE_CHECKING, Self
 
 import numpy as np
 
-from enumsol.arithmetic.balls import SAFE, TINY, UNIT, Ball, gamma, upper_norm
+from enumsol.arithmetic.balls import SAFE, TINY, UNIT, Ball, gamma, least_eigenvalue, upper_norm
 from enumsol.model.sectors import SECTORS, direction, end_number
 from enumsol.trusted.space.sector_rows import FRICTIONLESS, OPEN, SLIP_MINUS, SLIP_PLUS
-from enumsol.trusted.uniqueness_forms import least_eigenvalue
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from enumsol.condensation.space_condensed import EnclosedSpace, PieceSpace
+    from enumsol.condensation.space_condensed import EnclosedSpace
     from enumsol.support.array_types import Floats, Indices
     from enumsol.trusted.uniqueness_forms import Multipliers
 
@@ -151,7 +150,7 @@ def _ellipsoid(
 _CORNERS = 16
 
 
-def is_unbalanced_in_space(system: EnclosedSpace | PieceSpace, codes: Sequence[int], z: Floats) -> bool:
+def is_unbalanced_in_space(system: EnclosedSpace, codes: Sequence[int], z: Floats) -> bool:
     """True if no forces below a partial assignment are in balance with the load, by z (r,); see theory, (14.7).
 
     z'h > 0, and z'G y <= 0 for all y of every node: (1, tau) with tau in the disc, or on the arc of its sector. Proven
@@ -204,7 +203,7 @@ def unbounded(system: EnclosedSpace) -> EnclosedSpace:
     return system.reaching(np.full_like(system.reach, np.inf))
 
 
-def resultants(system: EnclosedSpace | PieceSpace, codes: Sequence[int]) -> list[Floats]:
+def resultants(system: EnclosedSpace, codes: Sequence[int]) -> list[Floats]:
     """Resultants G y, (r,) each, whose cone holds all that the forces of an assignment can have, but for rounding."""
     G, discs = system.rows.G.mid / system.unit, system.discs.mid.tolist()
     found = []

@@ -11,7 +11,6 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from enumsol.arithmetic.balls import SAFE, TINY, UNIT, Ball
-from enumsol.condensation.space_condensed import PieceSpace
 from enumsol.trusted.space.force_bound import is_unbalanced_in_space
 from enumsol.trusted.space.leaf_equations import (
     ROUNDED_ANGLE,
@@ -32,7 +31,7 @@ from enumsol.trusted.space.space_uniqueness import is_complete, only_on_curve
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from enumsol.condensation.space_condensed import AlphaSpace, EnclosedSpace, PieceSpace
+    from enumsol.condensation.space_condensed import AlphaSpace, EnclosedSpace
     from enumsol.support.array_types import Codes, Floats
     from enumsol.trusted.space.curve_runs import KnownCurve, LinkRange
     from enumsol.trusted.space.sector_rows import Row
@@ -68,12 +67,12 @@ class AlphaPiece:
         return (self.low + self.high) / 2
 
     @cached_property
-    def whole(self) -> PieceSpace:
+    def whole(self) -> EnclosedSpace:
         """The data over all of it."""
         return self.space.over(self.low, self.high)
 
     @cached_property
-    def ends(self) -> tuple[PieceSpace, PieceSpace]:
+    def ends(self) -> tuple[EnclosedSpace, EnclosedSpace]:
         """The data at both ends."""
         return self.space.at(self.low), self.space.at(self.high)
 

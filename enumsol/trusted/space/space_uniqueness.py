@@ -43,7 +43,7 @@ if TYPE_CHECKING:
     from fractions import Fraction
     from typing import Self
 
-    from enumsol.condensation.space_condensed import EnclosedSpace, PieceSpace
+    from enumsol.condensation.space_condensed import EnclosedSpace
     from enumsol.support.array_types import Codes, Floats, Mask
     from enumsol.trusted.space.curve_runs import CurveParts
 
@@ -409,7 +409,7 @@ class PieceWeights:
     thetas: tuple[Floats, Floats]
 
     @classmethod
-    def of(cls, system: PieceSpace, numbers: Floats) -> PieceWeights | None:
+    def of(cls, system: EnclosedSpace, numbers: Floats) -> PieceWeights | None:
         """From one array: mu and kappa of all nodes, then nu and both thetas of all tau, in the order of y; or None."""
         p, m = len(system.tau), len(system.g)
         if numbers.shape != (2 * p + 3 * (m - p),) or not np.all(np.isfinite(numbers)):
@@ -421,7 +421,7 @@ class PieceWeights:
             right = (mu > 0) & (kappa > 0) & (upper_norm(nu, axis=1) * system.largest_discs * SAFE <= mu)
         return cls(mu, kappa, nu, (low, high)) if np.all(right) else None
 
-    def multipliers(self, system: PieceSpace, psi: Ball) -> Multipliers:
+    def multipliers(self, system: EnclosedSpace, psi: Ball) -> Multipliers:
         """D of all nodes at an end of the piece."""
         unit = np.where(system.tau >= 0, system.unit[system.tau], 1.0)
         turn = Ball(psi.mid / unit, psi.rad / unit * SAFE + TINY * (system.tau >= 0))
@@ -429,7 +429,7 @@ class PieceWeights:
 
 
 def only_on_curve(
-    system: PieceSpace,
+    system: EnclosedSpace,
     piece: tuple[Fraction, Fraction],
     codes: Sequence[int],
     numbers: Floats,
@@ -440,7 +440,7 @@ def only_on_curve(
 
     Parameters
     ----------
-    system : PieceSpace
+    system : EnclosedSpace
         Over the piece.
     piece : its ends
     codes : (partial) status codes; a sector counts as contact
@@ -484,7 +484,11 @@ def _shares(piece: tuple[Fraction, Fraction], alpha: Ball) -> Ball:
 
 
 def how_far_off(
-    system: PieceSpace, piece: tuple[Fraction, Fraction], weights: PieceWeights, psi: Sequence[Ball], parts: CurveParts
+    system: EnclosedSpace,
+    piece: tuple[Fraction, Fraction],
+    weights: PieceWeights,
+    psi: Sequence[Ball],
+    parts: CurveParts,
 ) -> Floats:
     """Bound of the distance of psi from r theta with a theta that serves the curve's solution, (p,), at all alphas.
 
