@@ -15,7 +15,7 @@ import scipy.sparse as sp
 from enumsol.arithmetic.balls import SAFE, TINY, UNIT, Ball, Inverse
 from enumsol.condensation.enclosure import CondensedEnclosure, NotEnclosedError
 from enumsol.condensation.factorization import Factorization
-from enumsol.condensation.products import Products
+from enumsol.condensation.products import Products, product
 from enumsol.errors import InvalidProblemError
 
 if TYPE_CHECKING:
@@ -215,7 +215,7 @@ class DynamicStiffness:
             if self.held:
                 return K @ Pencil(self.A, rows).compliance()[:m, m]
             _, share, inverse = self._on_springs
-            h = _moved(sp.csr_array(load[None, :]), self._modes)
+            h = product(sp.csr_array(load[None, :]), self._modes)
             balance = inverse.solve(Ball(h.mid.T, h.rad.T))
             return K @ self._springs_and(rows)[:m, m] + (share @ balance)[:, 0]
         except NotEnclosedError:
@@ -225,7 +225,7 @@ class DynamicStiffness:
     def _on_springs(self) -> tuple[Ball, Ball, Inverse]:
         """K of the body on springs, K G', and what solves with G K G'."""
         K = self._inverse(self._springs_and(self.rows))
-        G = _moved(self.rows, self._modes)
+        G = product(self.rows, self._modes)
         share = K @ G
         inverse = Inverse.of(Ball(G.mid.T, G.rad.T) @ share)
         if inverse is None:
@@ -250,9 +250,3 @@ class DynamicStiffness:
         if inverse is None:
             raise NotEnclosedError("S(mu) is not proven regular")
         return inverse.whole().symmetric
-
-
-def _moved(rows: sp.csr_array, modes: Any) -> Ball:
-    """B N, (m, r)."""
-    size = abs(rows) @ np.abs(modes)
-    return Ball(np.asarray(rows @ modes), np.asarray(size * (modes.shape[0] + 2) * 2 * UNIT * SAFE + TINY))

@@ -16,7 +16,7 @@ from enumsol.arithmetic.balls import Ball
 from enumsol.errors import InvalidProblemError
 from enumsol.model.statuses import OPEN, SLIP_MINUS, SLIP_PLUS, STICK
 from enumsol.support.deadlines import look
-from enumsol.trusted.running_away import Behaviour, Crossing, Growing, Motion, Motions
+from enumsol.trusted.running_away import Behaviour, Crossing, Growing, Motions
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
@@ -48,7 +48,7 @@ class GrowingMotions:
     def __init__(self, stiffness: DynamicStiffness, motions: Motions) -> None:
         self.stiffness, self.motions = stiffness, motions
 
-    def between(self, low: float, high: float) -> Iterator[tuple[Growing, Motion]]:
+    def between(self, low: float, high: float) -> Iterator[tuple[Growing, Ball]]:
         """Motions proven to grow in a range."""
         low = low if low > 0 else 1e-6 * smallest_eigenvalue(self.stiffness)
         high = high if np.isfinite(high) else 1e4 * max(low, largest_eigenvalue(self.stiffness))

@@ -24,11 +24,12 @@ from enumsol.search.growing_motions import (
 )
 from enumsol.support.conic import conic_answer
 from enumsol.support.deadlines import look
-from enumsol.trusted.running_away import Growing, Motion, Motions, NoMotion
+from enumsol.trusted.running_away import Growing, Motions, NoMotion
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
 
+    from enumsol.arithmetic.balls import Ball
     from enumsol.condensation.dynamic import DynamicStiffness
     from enumsol.support.array_types import Floats, Integers
 
@@ -52,14 +53,14 @@ class Proven:
     ----------
     leaves : tuple of NoMotion
         Certificates by which nothing grows, by range.
-    growing : tuple of (certificate, Motion)
+    growing : tuple of (certificate, motion x)
         By growth rate, the largest first.
     gaps : tuple of (low, high)
         Ranges of mu of which neither is proven.
     """
 
     leaves: tuple[NoMotion, ...]
-    growing: tuple[tuple[Growing, Motion], ...]
+    growing: tuple[tuple[Growing, Ball], ...]
     gaps: tuple[tuple[float, float], ...]
 
 

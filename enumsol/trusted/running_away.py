@@ -339,27 +339,13 @@ def rates_in(
 
 
 @dataclass(frozen=True, eq=False)
-class Motion:
-    """A motion that grows, as it is enclosed.
-
-    Attributes
-    ----------
-    mu : pair of float
-        Bounds of the square of its growth rate.
-    x : Ball (k,)
-    """
-
-    mu: tuple[float, float]
-    x: Ball
-
-
-@dataclass(frozen=True, eq=False)
 class Growing:
     """A range of mu in which a motion grows, and what every node does in it (theory, section 15.4).
 
     Attributes
     ----------
     low, high : float
+        Bounds of the square of its growth rate.
     way : Behaviour
     """
 
@@ -367,12 +353,12 @@ class Growing:
     high: float
     way: Behaviour
 
-    def found(self, stiffness: Stiffness, motions: Motions) -> Motion | None:
-        """The motion, if it is proven to be there."""
+    def found(self, stiffness: Stiffness, motions: Motions) -> Ball | None:
+        """The motion x, (k,), if it is proven to be there."""
         with np.errstate(all="ignore"):
             return self._found(stiffness, motions)
 
-    def _found(self, stiffness: Stiffness, motions: Motions) -> Motion | None:
+    def _found(self, stiffness: Stiffness, motions: Motions) -> Ball | None:
         k = len(motions.signed)
         slides, touching = self.way.slides, self.way.touching
         if motions.unsure or not 0 < self.low < self.high < np.inf or len(touching) != len(motions.touching):
@@ -395,7 +381,7 @@ class Growing:
         x = Ball.exact(np.zeros(k))
         x[own] = vector[:, 0]
         signs = self.way.signs(motions, x, K @ (right @ vector))
-        return Motion((self.low, self.high), x) if np.all(signs.mid - signs.rad > 0) else None
+        return x if np.all(signs.mid - signs.rad > 0) else None
 
 
 @dataclass(frozen=True, eq=False)
