@@ -23,7 +23,7 @@ from enumsol.relaxation.active_set import ActiveSetRelaxation
 from enumsol.relaxation.imposed_rows import row_normals
 from enumsol.relaxation.space_relaxation import SpaceRelaxation
 from enumsol.support.deadlines import look
-from enumsol.trusted.quadratic_forms import EnclosedForm, Equations
+from enumsol.trusted.quadratic_forms import EnclosedForm, equations_of
 from enumsol.trusted.space.sector_margins import SlipForm
 from enumsol.trusted.space.sector_rows import sector_row_terms
 from enumsol.trusted.status_rows import CONTACT, UNDECIDED
@@ -194,7 +194,7 @@ class PlaneFormAscent(FormAscent[EnclosedForm, ActiveSetRelaxation]):
         self._scaled, self._enclosed, self._engine, self._codes, self._rows = scaled, enclosed, engine, codes, rows
         self.S, self.g = scaled.S, scaled.g
         p, status = scaled.p, np.asarray(codes)
-        a = Equations.of(enclosed, codes).a
+        a = equations_of(enclosed, codes)[0].mid
         self.across = _complement(a) if len(a) else np.eye(2 * p)
         normal = status == UNDECIDED
         tangential = (normal | (status == CONTACT)) & (scaled.F > 0)

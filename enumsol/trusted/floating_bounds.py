@@ -4,7 +4,7 @@ With multipliers y on S lambda - g - G'q and c on lambda, and any z on G lambda 
 
     min e - h'q  >=  B(y, c + G'z) + z'h + min (G y - h)'q
 
-where B is the bound of the body on springs (``trusted.energy_bounds``). The last term vanishes if G y = h, and is at
+where B is the bound of the body on springs (``energy_bounds``). The last term vanishes if G y = h, and is at
 least -reach'|G y - h| otherwise. Where no forces are in balance with the load, no energy is asked for.
 
 Far away the body moves as if it were rigid (theory, section 14.4): w is G'q but for an elastic part that is bounded,
@@ -21,7 +21,7 @@ import numpy as np
 from enumsol.arithmetic.balls import SAFE, TINY, UNIT, Ball, gamma, upper_norm
 from enumsol.condensation.enclosure import NotEnclosedError
 from enumsol.support.deadlines import look
-from enumsol.trusted.energy_bounds import dots, energy_bounds
+from enumsol.trusted.quadratic_forms import dots, energy_bounds
 from enumsol.trusted.status_rows import BACKWARD, FORWARD, FRICTIONLESS, OPEN, SLIP_MINUS, SLIP_PLUS, UNDECIDED
 
 if TYPE_CHECKING:

@@ -78,7 +78,7 @@ SHARED = {
         ),
     },
     "trusted.running_away": None,
-    "trusted.quadratic_forms": {"EnclosedForm", "Equations", "QuadraticForm"},
+    "trusted.quadratic_forms": {"EnclosedForm", "QuadraticForm", "equations_of"},
     "trusted.status_rows": None,
     "trusted.space.sector_margins": {"SlipForm"},
     "trusted.space.sector_rows": None,
