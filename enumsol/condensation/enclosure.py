@@ -89,13 +89,8 @@ class CondensedEnclosure(Sealed):
         NotEnclosedError
             Something over- or underflows.
         """
-        if not products.bounded:
-            raise NotEnclosedError(_OVERFLOW)
-        bound = self.stiffness_bound
         with np.errstate(over="ignore", invalid="ignore", divide="ignore"):
-            g0, g0_rad, g1, g1_rad, *free = _displaced(problem, products, products.radii(bound))
-        S = self.S, self.S_rad
-        return CondensedEnclosure(*S, g0, g0_rad, g1, g1_rad, bound, problem, (free[0], free[1]))._finite()
+            return self._from_problem(problem, products, self)._finite()
 
     def moved_freely(self, alpha: Fraction) -> Ball:
         """B A^-1 f(alpha), where the contact nodes would be without contact, shape (2p,) [length]."""
@@ -129,28 +124,24 @@ class CondensedEnclosure(Sealed):
         return self
 
     @classmethod
-    def _from_problem(cls, problem: ProblemData, products: Products | None) -> CondensedEnclosure:
+    def _from_problem(
+        cls, problem: ProblemData, products: Products | None, before: CondensedEnclosure | None = None
+    ) -> CondensedEnclosure:
+        """Balls of a problem, of the same body as one ``before`` if there is that."""
         products = Products.of(problem) if products is None else products
         if not products.bounded:
             raise NotEnclosedError(_OVERFLOW)
-        scale, size = products.scale, len(products.mid)
-        A, _ = scaled(sp.csr_array(problem.A), scale, scale)
-        estimate = _smallest_eigenvalue(problem, scale)
-        bound = attended(
-            lambda: sparse_eigenvalue_bound(sp.csc_array(A), estimate), A.nnz, "bound of the smallest eigenvalue of A"
-        )
-        if not bound > 0:
-            raise NotEnclosedError(
-                "A is positive definite only within rounding: its smallest eigenvalue, after scaling to a unit "
-                "diagonal, could not be proven positive"
-            )
-        mid, rad = products.mid, products.radii(bound)
-        S, S_rad = mid[:, :size], rad[:, :size]
+        bound = _stiffness_bound(problem, products.scale) if before is None else before.stiffness_bound
+        rad, size = products.radii(bound), len(products.mid)
+        g0, g0_rad, g1, g1_rad, *free = _displaced(problem, products, rad)
+        load = g0, g0_rad, g1, g1_rad, bound, problem, (free[0], free[1])
+        if before is not None:
+            return cls(before.S, before.S_rad, *load)
+        S, S_rad = products.mid[:, :size], rad[:, :size]
         # the exact S is symmetric and lies in both triangles' balls
         sym = 0.5 * (S + S.T)
         S_rad = (np.maximum(S_rad, S_rad.T) + np.abs(S - S.T) + 2 * UNIT * np.abs(sym)) * SAFE
-        g0, g0_rad, g1, g1_rad, *free = _displaced(problem, products, rad)
-        return cls(sym, S_rad, g0, g0_rad, g1, g1_rad, bound, problem, (free[0], free[1]))
+        return cls(sym, S_rad, *load)
 
     def at(self, alpha: AlphaLike, force: Floats, length: Floats) -> EnclosedSystem:
         """The enclosed system of a 2D problem at one alpha, in units given by powers of two (see ScaledSystem)."""
@@ -249,8 +240,15 @@ def _displaced(problem: ProblemData, products: Products, rad: Floats) -> tuple[F
     return g0, g0_rad, free[:, 1], free_rad[:, 1], free[:, 0], free_rad[:, 0]
 
 
-def _smallest_eigenvalue(problem: ProblemData, scale: Floats) -> float:
-    """Estimate of the smallest eigenvalue of the scaled A by inverse iteration."""
+def _stiffness_bound(problem: ProblemData, scale: Floats) -> float:
+    """Proven lower bound on the smallest eigenvalue of the scaled A, from an estimate by inverse iteration.
+
+    Raises
+    ------
+    NotEnclosedError
+        None that is positive was found.
+    """
+    A, _ = scaled(sp.csr_array(problem.A), scale, scale)
     vector = np.random.default_rng(1).normal(size=problem.n)
     value = 1.0
     for _ in range(4):
@@ -258,7 +256,15 @@ def _smallest_eigenvalue(problem: ProblemData, scale: Floats) -> float:
         image = problem.factorization.solve(vector / scale, refined=False) / scale
         value = 1.0 / float(np.linalg.norm(image))
         vector = image
-    return value
+    bound = attended(
+        lambda: sparse_eigenvalue_bound(sp.csc_array(A), value), A.nnz, "bound of the smallest eigenvalue of A"
+    )
+    if not bound > 0:
+        raise NotEnclosedError(
+            "A is positive definite only within rounding: its smallest eigenvalue, after scaling to a unit diagonal, "
+            "could not be proven positive"
+        )
+    return bound
 
 
 def moved_by_modes(problem: ProblemData) -> Ball:
@@ -472,11 +478,7 @@ class EnclosedSystem:
     @property
     def largest_unknowns(self) -> float:
         """A bound of the norm of all unknowns, (lambda, q), at a root within the bounds."""
-        return (
-            float(np.hypot(self.largest_forces, upper_norm(self.reach)) * SAFE)
-            if len(self.reach)
-            else self.largest_forces
-        )
+        return float(np.hypot(self.largest_forces, upper_norm(self.reach)) * SAFE)
 
     @cached_property
     def mode_inverse(self) -> Floats:

@@ -313,11 +313,6 @@ class AlphaSpace:
     def _variables(self) -> _Variables:
         return _variables(*self._friction)
 
-    @property
-    def _rows(self) -> tuple[Ball, Indices]:
-        """By what the rows that y takes are multiplied, and where they are among 3p."""
-        return self._variables[:2]
-
     @cached_property
     def fixed(self) -> EnclosedSpace:
         """S, F and the places of tau, which do not depend on alpha, with g at ``reference``."""
@@ -370,7 +365,7 @@ class AlphaSpace:
             if min(ends) < 0 or (not any(by) and max(ends) > 0):
                 raise NotEnclosedError("a coefficient of friction is negative, or begins to be positive, over a piece")
         middle, half = (low + high) / 2, (high - low) / 2
-        (weight, rows), length, held = self._rows, np.tile(self.units[1], 3), self.fixed
+        (weight, rows), length, held = self._variables[:2], np.tile(self.units[1], 3), self.fixed
         g, g_rad = self.enclosure.load_in_units(middle, length)
         disc, disc_turn, step = self.discs(middle), self.discs(half, Fraction(0)), nearest([half])[0]
         with np.errstate(over="ignore", invalid="ignore"):
@@ -404,7 +399,7 @@ class AlphaSpace:
         """Equilibrium of the body as a whole at alpha, on (lambda_n, tau)."""
         force, length = self.units
         rows = RigidRows.of(self.enclosure.problem, alpha, np.tile(force, 3), np.tile(length, 3))
-        weight, own = self._rows
+        weight, own, _ = self._variables
         return _on_tau(rows, own, weight)
 
 

@@ -117,17 +117,12 @@ def settled_selection(
     """
     ball = solve_selection(system, codes)
     if ball is None or not ball.is_root:
-        if holds_no_root(system, codes, ball):
+        if (ball is not None and ball.is_excluded) or contradicts(system, codes):
             return None
         ball = precisely(codes) or ball
         if ball is not None and ball.is_excluded:
             return None
     return ball if ball is not None and ball.is_root else Unsettled(ball)
-
-
-def holds_no_root(system: EnclosedSystem, codes: Sequence[int], ball: VerifiedSelection | None) -> bool:
-    """True if a complete selection is proven to hold no root; ``ball`` is its verified solution, if it has one."""
-    return (ball is not None and ball.is_excluded) or contradicts(system, codes)
 
 
 def contradicts(system: EnclosedSystem, codes: Sequence[int]) -> bool:

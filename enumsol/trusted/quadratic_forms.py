@@ -16,11 +16,12 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from enumsol.arithmetic.balls import ROOT_TINY, SAFE, TINY, UNIT, Ball, gamma, least_eigenvalue, upper_norm
+from enumsol.trusted.selection import joined
 from enumsol.trusted.status_rows import CONTACT, OPEN, SLIP_MINUS, SLIP_PLUS, STICK, UNDECIDED
 
 if TYPE_CHECKING:
@@ -56,6 +57,13 @@ def equations_of(system: EnclosedSystem, codes: Sequence[int]) -> tuple[Ball, Ba
     F = Ball(side * system.F[turning], np.abs(side) * system.F_rad[turning])
     a[np.arange(m - len(turning), m), turning] = F
     return a, b
+
+
+def multiplied(rows: Any, F: Any, multipliers: Any) -> Any:
+    """D' applied to a row for every component of w, (2p, k), with multipliers (4, p); all of them floats or balls."""
+    p, (mu, nu, alpha, beta) = F.shape[0], (multipliers[k] for k in range(4))
+    left, right, twice = joined(mu, nu), joined(F * (beta - alpha), alpha + beta), np.tile(np.arange(p), 2)
+    return rows[twice] * left[:, None] + rows[p + twice] * right[:, None]
 
 
 @dataclass(frozen=True, eq=False)
@@ -137,14 +145,9 @@ class EnclosedForm(QuadraticForm):
         weight : float
             That of the equations, at least zero; each is divided by the square of its length.
         """
-        mu, nu, alpha, beta = map(Ball.exact, multipliers)
-        p, F, k = system.p, Ball(system.F, system.F_rad), Ball.exact(np.zeros((1, 1)))
-        left, right = Ball.joined(mu, nu), Ball.joined(F * (beta - alpha), alpha + beta)
-        # D' applied to what has a row for every component of w
-        normal = np.concatenate([np.arange(p)] * 2)
-        S, g = Ball(system.S, system.S_rad), Ball(system.g, system.g_rad)
-        form = S[normal] * left[:, None] + S[p + normal] * right[:, None]
-        h = g[normal] * left + g[p + normal] * right
+        numbers, F, k = Ball.exact(multipliers), Ball(system.F, system.F_rad), Ball.exact(np.zeros((1, 1)))
+        form = multiplied(Ball(system.S, system.S_rad), F, numbers)
+        h = multiplied(Ball(system.g, system.g_rad)[:, None], F, numbers)[:, 0]
         a, b = equations_of(system, codes)
         if weight and len(b.mid):
             # any positive numbers are exact weights
@@ -154,8 +157,8 @@ class EnclosedForm(QuadraticForm):
             k = (b * factor)[None] @ b[:, None]
         H = 0.5 * (form.mid + form.mid.T)
         H_rad = (0.5 * (form.rad + form.rad.T) + 2 * UNIT * np.abs(H)) * SAFE
-        numbers = float(k.mid[0, 0]), float(k.rad[0, 0])
-        return cls(system, H, H_rad, h.mid, h.rad, *numbers, tuple(codes), multipliers, weight, system.F_rad)
+        constant = float(k.mid[0, 0]), float(k.rad[0, 0])
+        return cls(system, H, H_rad, h.mid, h.rad, *constant, tuple(codes), multipliers, weight, system.F_rad)
 
 
 def energy_bounds(
