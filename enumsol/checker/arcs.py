@@ -362,8 +362,10 @@ class ArcChecker:
     @cached_property
     def precise_system(self) -> Any:
         """The problem in many digits."""
-        from enumsol.trusted.arcs.many_digits import affordable
-        from enumsol.trusted.arcs.precise import system_in_many_digits  # python-flint, not for all proofs
+        from enumsol.trusted.arcs.precise import (
+            affordable,
+            system_in_many_digits,  # python-flint, not for all proofs
+        )
 
         if not affordable(self._problem):
             raise ValueError("a box in many digits belongs to a problem that is too large for it")

@@ -13,9 +13,8 @@ import numpy as np
 import scipy.sparse as sp
 
 from enumsol.arithmetic.balls import SAFE, TINY, UNIT, Ball, Inverse
-from enumsol.condensation.enclosure import CondensedEnclosure, NotEnclosedError
+from enumsol.condensation.enclosure import CondensedEnclosure, NotEnclosedError, Products, product
 from enumsol.condensation.factorization import Factorization
-from enumsol.condensation.products import Products, product
 from enumsol.errors import InvalidProblemError
 
 if TYPE_CHECKING:

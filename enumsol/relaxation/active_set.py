@@ -28,12 +28,15 @@ from enumsol.errors import InvalidProblemError, MissingDependencyError
 from enumsol.model.statuses import CONDITIONS, SLIP_MINUS, SLIP_PLUS, UNDECIDED, RowKind
 from enumsol.relaxation.engine import (
     BRANCHING_CANDIDATES,
+    EQUALITY,
     FEASIBILITY_TOLERANCE,
+    INEQUALITY,
     PRUNE_MARGIN,
     Relaxation,
     not_compiled,
+    row_terms,
+    status_rows,
 )
-from enumsol.relaxation.imposed_rows import EQUALITY, INEQUALITY, row_terms, status_rows
 from enumsol.support.array_types import Alpha, Codes, Floats, Indices, NDArray
 from enumsol.trusted.quadratic_forms import multiplied
 

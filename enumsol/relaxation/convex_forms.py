@@ -20,7 +20,7 @@ from scipy.linalg import cho_factor, cho_solve, qr, solve_triangular
 
 from enumsol.arithmetic.balls import factor_above
 from enumsol.relaxation.active_set import ActiveSetRelaxation
-from enumsol.relaxation.imposed_rows import row_normals
+from enumsol.relaxation.engine import row_normals
 from enumsol.relaxation.space_relaxation import SpaceRelaxation
 from enumsol.support.deadlines import look
 from enumsol.trusted.quadratic_forms import EnclosedForm, equations_of

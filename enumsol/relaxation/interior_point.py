@@ -9,8 +9,7 @@ import scipy.sparse as sp
 from scipy.linalg import solve_triangular
 
 from enumsol.model.statuses import CONTACT, UNDECIDED
-from enumsol.relaxation.engine import PRUNE_MARGIN, Relaxation
-from enumsol.relaxation.imposed_rows import EQUALITY, row_terms
+from enumsol.relaxation.engine import EQUALITY, PRUNE_MARGIN, Relaxation, row_terms
 from enumsol.support.conic import conic_answer
 
 if TYPE_CHECKING:

@@ -13,8 +13,8 @@ from enumsol.branches.enclosed.zeros import zeros_of
 from enumsol.condensation.exact import ExactCondensed
 from enumsol.model.statuses import RowKind
 from enumsol.selections.functions import SelectionFunctions
-from enumsol.trusted.arcs.many_digits import precision
 from enumsol.trusted.arcs.selection_balls import ArcSystem
+from enumsol.trusted.arcs.taylor import precision
 from enumsol.trusted.selection import Selection
 from enumsol.trusted.status_rows import FRICTIONLESS
 

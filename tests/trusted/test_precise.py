@@ -15,10 +15,9 @@ from enumsol.arithmetic.algebraic import real_roots
 from enumsol.branches.enclosed.zeros import zeros_of
 from enumsol.condensation.exact import ExactCondensed
 from enumsol.gallery import wedge
-from enumsol.trusted.arcs import many_digits as refined
-from enumsol.trusted.arcs.many_digits import PRECISION, ball_of, precision, upper, uppers
+from enumsol.trusted.arcs import precise as refined
 from enumsol.trusted.arcs.precise import PreciseSelection, system_in_many_digits
-from enumsol.trusted.arcs.taylor import Smooth
+from enumsol.trusted.arcs.taylor import PRECISION, Smooth, ball_of, precision, upper, uppers
 from enumsol.trusted.status_rows import FRICTIONLESS
 
 

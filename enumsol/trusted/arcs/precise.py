@@ -1,9 +1,13 @@
 """Selections over short intervals of alpha in balls of many digits (theory, section 7.14).
 
 Where several conditions vanish within the rounding of double arithmetic, S and g are computed from the problem's own
-data in balls of many_digits.PRECISION bits, and the events are told apart there. Over a short interval the unknowns and
+data in balls of taylor.PRECISION bits, and the events are told apart there. Over a short interval the unknowns and
 their slopes are enclosed at once; conditions whose slopes have one sign are known from their values at both ends.
 `verified_in_many_digits` solves selections at one alpha that other arithmetics leave open (theory, section 6.3).
+
+S, g0 and g1 come from solutions in floats that exact residuals refine: the factors of A in double arithmetic give some
+thirty bits of A^-1 K more with every step, K = [B', f, load_slope]. The residuals are integers: nothing is rounded, and
+the matrix A is touched only where it has entries.
 """
 
 from __future__ import annotations
@@ -11,26 +15,19 @@ from __future__ import annotations
 from dataclasses import replace
 from fractions import Fraction
 from functools import partial
-from typing import TYPE_CHECKING, Any
+from itertools import pairwise
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
-from flint import arb, arb_mat
+import scipy.sparse as sp
+from flint import arb, arb_mat, fmpz_mat
 
 from enumsol.arithmetic.balls import SAFE, TINY, UNIT, Ball, upper_sum
 from enumsol.arithmetic.rationals import as_objects
-from enumsol.trusted.arcs.many_digits import (
-    affordable,
-    ball_of,
-    column,
-    matrix,
-    precision,
-    products,
-    refined_table,
-    upper,
-    uppers,
-)
+from enumsol.condensation.enclosure import NotEnclosedError, scaled
+from enumsol.support.deadlines import look, tell
 from enumsol.trusted.arcs.selection_balls import ArcSystem
-from enumsol.trusted.arcs.taylor import AlphaFunctions
+from enumsol.trusted.arcs.taylor import AlphaFunctions, ball_of, column, matrix, precision, upper, uppers
 from enumsol.trusted.at_alpha import VerifiedSelection, conditions_of
 from enumsol.trusted.selection import Selection
 
@@ -220,3 +217,139 @@ def _in_floats(values: NDArray[Any]) -> Ball:
     away = np.array([upper(x - arb(m)) for x, m in zip(values, mid.tolist(), strict=True)])
     with np.errstate(over="ignore", invalid="ignore"):
         return Ball(mid, np.where(known, 0.0, np.maximum(away * SAFE, _RADIUS * np.abs(mid)) + TINY))
+
+
+def products(left: Floats | sp.sparray, right: Floats) -> NDArray[Any]:
+    """The product of two matrices of floats, the first of which may be sparse, in balls."""
+    rows, factors = sp.csr_array(left), np.array([[arb(x) for x in row] for row in right.tolist()], dtype=object)
+    found = np.full((rows.shape[0], right.shape[1]), arb(0), dtype=object)
+    for i, (first, last) in enumerate(pairwise(rows.indptr)):
+        for value, j in zip(rows.data[first:last].tolist(), rows.indices[first:last], strict=True):
+            found[i] = found[i] + arb(value) * factors[j]
+    return found
+
+
+#: Residuals are refined to this many bits, beside columns of size one; the error of S has twice as many.
+_RESIDUAL_BITS = 170
+#: Bits behind the point of solutions.
+_SOLUTION_BITS = 208
+#: Most steps; a step that gains fewer bits is the last.
+_STEPS, _LEAST_GAIN = 40, 4
+#: Rows of A that are multiplied together.
+_ROWS = 128
+
+
+def affordable(problem: ContactProblem) -> bool:
+    """True if a problem is small enough for balls of many digits: by the entries of A and the number of rows."""
+    # most products of an entry of A with one of a solution in a step: some ten seconds for all steps
+    return bool(problem.A.nnz * (problem.contact_rows.shape[0] + 2) <= 2**24)
+
+
+def refined_table(problem: ContactProblem) -> list[list[Any]] | None:
+    """B A^-1 [B', f, load_slope] in balls, 2p rows of 2p + 2 arb; None where A is not proven positive definite.
+
+    With X an approximation of A^-1 K and E = K - A X, without rounding,
+
+        k_i' A^-1 k_j  =  k_i' x_j + x_i' e_j + e_i' A^-1 e_j,       |e_i' A^-1 e_j|  <=  ||e_i|| ||e_j|| / mu(A).
+
+    Raises
+    ------
+    TimeOverError
+        The deadline that holds here has passed.
+    """
+    try:
+        bound = problem.enclosure.stiffness_bound
+    except NotEnclosedError:
+        return None
+    scale = problem.products.scale
+    A, _ = scaled(sp.csr_array(problem.A), scale, scale)
+    slope = np.zeros(problem.n) if problem.load_slope is None else problem.load_slope
+    K = _columns(np.column_stack([problem.contact_rows.toarray().T, problem.f, slope]), scale)
+    entries = _ScaledIntegers.of(*_parts(A.data))
+    X, E, bits = _refined(problem, A, entries, K, scale)
+    size = problem.contact_rows.shape[0]
+    first = fmpz_mat(K.values.T[:size].tolist()) * fmpz_mat(X.tolist())
+    second = fmpz_mat(X.T[:size].tolist()) * fmpz_mat(E.tolist())
+    lengths = [arb((sum(e * e for e in column), -2 * bits)).sqrt() for column in E.T.tolist()]
+    table = []
+    for i in range(size):
+        row = []
+        for j in range(size + 2):
+            rest = (lengths[i] * lengths[j] / arb(bound)).upper()
+            value = arb((int(first[i, j]), -K.bits - _SOLUTION_BITS)) + arb((int(second[i, j]), -_SOLUTION_BITS - bits))
+            row.append((value + arb(0, rest)) * arb((1, K.units[i] + K.units[j])))
+        table.append(row)
+    return table
+
+
+class _ScaledIntegers(NamedTuple):
+    """Numbers as integers, values * 2^-bits; the columns of a matrix may have units, 2^unit, beside that."""
+
+    values: NDArray[Any]
+    bits: int
+    units: list[int]
+
+    @classmethod
+    def of(cls, whole: NDArray[Any], exponent: NDArray[Any], units: NDArray[Any] | None = None) -> _ScaledIntegers:
+        """The numbers whole * 2^exponent."""
+        exponent = np.where(whole != 0, exponent if units is None else exponent - units, 0)
+        bits = -int(np.min(exponent, initial=0))
+        return cls(
+            whole.astype(object) << (exponent + bits).astype(object), bits, [] if units is None else units.tolist()
+        )
+
+
+def _columns(floats: Floats, scale: Floats) -> _ScaledIntegers:
+    """The columns of K, A's scaling applied, in units in which their largest entries are near one."""
+    whole, exponent = _parts(floats)
+    # a product by a power of two, without the underflow that floats may have
+    exponent = exponent + np.frexp(scale)[1][:, None] - 1
+    largest = np.max(np.where(whole != 0, exponent + 53, -(2**30)), axis=0)
+    return _ScaledIntegers.of(whole, exponent, np.where(np.any(whole, axis=0), largest, 0))
+
+
+def _parts(floats: Floats) -> tuple[NDArray[Any], NDArray[Any]]:
+    """Integers m and e with floats = m 2^e."""
+    mantissa, exponent = np.frexp(floats)
+    return np.ldexp(mantissa, 53).astype(np.int64), exponent.astype(np.int64) - 53
+
+
+def _refined(
+    problem: ContactProblem, A: sp.csr_array, entries: _ScaledIntegers, K: _ScaledIntegers, scale: Floats
+) -> tuple[NDArray[Any], NDArray[Any], int]:
+    """X times 2^_SOLUTION_BITS, the exact residual K - A X times 2^bits, and bits."""
+    bits = entries.bits + _SOLUTION_BITS + K.bits
+    E = K.values << (bits - K.bits)
+    X = np.zeros_like(E)
+    before = np.inf
+    for _ in range(_STEPS):
+        sizes = np.array([max((abs(e).bit_length() for e in column), default=0) for column in E.T.tolist()])
+        largest = int(np.max(sizes, initial=0)) - bits
+        if largest <= -_RESIDUAL_BITS or largest > before - _LEAST_GAIN:
+            break
+        before = largest
+        tell("bits of A^-1 B'", max(-largest, 0), _RESIDUAL_BITS)
+        # bits of a residual that floats are given
+        drop = np.maximum(sizes - 60, 0)
+        floats = (E >> drop.astype(object)).astype(float)
+        step = np.asarray(problem.factorization.solve(floats / scale[:, None], refined=False) / scale[:, None])
+        if not np.all(np.isfinite(step)):
+            break
+        whole, exponent = _parts(step)
+        shift = np.where(whole != 0, exponent + drop - (bits - _SOLUTION_BITS), 0)
+        dX = whole.astype(object) << np.maximum(shift, 0).astype(object) >> np.maximum(-shift, 0).astype(object)
+        X = X + dX
+        E = E - (_product(A, entries.values, dX) << K.bits)
+    return X, E, bits
+
+
+def _product(A: sp.csr_array, entries: NDArray[Any], X: NDArray[Any]) -> NDArray[Any]:
+    """A X in integers; every row of A has an entry."""
+    parts = []
+    for start in range(0, A.shape[0], _ROWS):
+        look()
+        ends = A.indptr[start : start + _ROWS + 1]
+        part = slice(ends[0], ends[-1])
+        terms = entries[part, None] * X[A.indices[part]]
+        parts.append(np.add.reduceat(terms, ends[:-1] - ends[0], axis=0))
+    return np.concatenate(parts)
