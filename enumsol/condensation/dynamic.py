@@ -215,7 +215,7 @@ class DynamicStiffness:
                 return K @ Pencil(self.A, rows).compliance()[:m, m]
             _, share, inverse = self._on_springs
             h = product(sp.csr_array(load[None, :]), self._modes)
-            balance = inverse.solve(Ball(h.mid.T, h.rad.T))
+            balance = inverse.solve(h.T)
             return K @ self._springs_and(rows)[:m, m] + (share @ balance)[:, 0]
         except NotEnclosedError:
             return None
@@ -226,7 +226,7 @@ class DynamicStiffness:
         K = self._inverse(self._springs_and(self.rows))
         G = product(self.rows, self._modes)
         share = K @ G
-        inverse = Inverse.of(Ball(G.mid.T, G.rad.T) @ share)
+        inverse = Inverse.of(G.T @ share)
         if inverse is None:
             raise NotEnclosedError("some rigid displacement moves no node in contact")
         return K, share, inverse
@@ -239,7 +239,7 @@ class DynamicStiffness:
     def _slow(self) -> Ball:
         """K(0) of a body that nothing holds: stiffness against all but the rigid motions (theory, (15.5))."""
         K, share, inverse = self._on_springs
-        return (K - share @ inverse.solve(Ball(share.mid.T, share.rad.T))).symmetric
+        return (K - share @ inverse.solve(share.T)).symmetric
 
     @staticmethod
     def _inverse(S: Ball) -> Ball:

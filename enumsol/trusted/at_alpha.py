@@ -92,10 +92,20 @@ class _Solved(NamedTuple):
     w: Ball
 
 
+@np.errstate(over="ignore", invalid="ignore")
 def solve_selection(system: EnclosedSystem, codes: Sequence[int]) -> VerifiedSelection | None:
     """The verified solution of a complete selection, or None when its matrix is not proven regular."""
-    with np.errstate(over="ignore", invalid="ignore"):
-        return _solve_selection(system, codes)
+    selection = Selection(codes, len(system.reach))
+    if not len(selection.unknown):
+        return _conditions(system, codes, Ball.exact(np.zeros(2 * system.p)), system.balls[1], 1)
+    solved = _solved(system, selection)
+    if solved is None:
+        return None
+    equations, _, force, w = solved
+    found = _conditions(system, codes, force, w, equations.sign)
+    if found.is_root or found.is_excluded:
+        return found
+    return _conditions(system, codes, force, _closer(system, selection, solved), equations.sign)
 
 
 @dataclass(frozen=True)
@@ -151,20 +161,6 @@ def contradicts(system: EnclosedSystem, codes: Sequence[int]) -> bool:
         least = abs(float(y @ b.mid)) - float(y_abs @ (b.rad + k * np.abs(b.mid))) * (1 + 2 * k) * SAFE - TINY
         product = np.abs(y @ M.mid) + y_abs @ (M.rad + k * np.abs(M.mid)) * (1 + 2 * k) * SAFE
         return bool(least > upper_norm(product) * system.largest_unknowns * SAFE + ROOT_TINY)
-
-
-def _solve_selection(system: EnclosedSystem, codes: Sequence[int]) -> VerifiedSelection | None:
-    selection = Selection(codes, len(system.reach))
-    if not len(selection.unknown):
-        return _conditions(system, codes, Ball.exact(np.zeros(2 * system.p)), system.balls[1], 1)
-    solved = _solved(system, selection)
-    if solved is None:
-        return None
-    equations, _, force, w = solved
-    found = _conditions(system, codes, force, w, equations.sign)
-    if found.is_root or found.is_excluded:
-        return found
-    return _conditions(system, codes, force, _closer(system, selection, solved), equations.sign)
 
 
 def displacements(system: EnclosedSystem, codes: Sequence[int]) -> Ball | None:

@@ -136,13 +136,10 @@ class NoMotion:
     weights: Floats
     products: tuple[Floats, Floats]
 
+    # what overflows is not finite, and proves nothing
+    @np.errstate(all="ignore")
     def holds(self, stiffness: DynamicStiffness, motions: Motions) -> bool:
         """True if it is proven that nothing grows in the range."""
-        # what overflows is not finite, and proves nothing
-        with np.errstate(all="ignore"):
-            return self._holds(stiffness, motions)
-
-    def _holds(self, stiffness: DynamicStiffness, motions: Motions) -> bool:
         if not 0 <= self.low < self.high or not self._admitted(motions):
             return False
         kept = np.setdiff1d(np.arange(len(motions.signed)), self.stays)
@@ -323,16 +320,16 @@ def rates_in(
     x = Ball.exact(np.zeros(len(motions.signed)))
     if own:
         # left'(held - K R x) = more
-        goal = left.T @ Ball(held.mid[:, None], held.rad[:, None])
+        goal = left.T @ held[:, None]
         slid = list(way.slides)
         if more is not None and slid:
-            goal[: len(slid)] = goal[: len(slid)] - Ball(more.mid[slid][:, None], more.rad[slid][:, None])
+            goal[: len(slid)] = goal[: len(slid)] - more[slid][:, None]
         moved = solution(_across(left, K, motions.moves[:, own]), goal)
         if moved is None:
             return None, held
         x[own] = moved[:, 0]
-    y = held - (K @ (motions.moves @ Ball(x.mid[:, None], x.rad[:, None])))[:, 0]
-    signs = way.signs(motions, x, -Ball(y.mid[:, None], y.rad[:, None]), more)
+    y = held - (K @ (motions.moves @ x[:, None]))[:, 0]
+    signs = way.signs(motions, x, -y[:, None], more)
     if np.any(signs.mid + signs.rad < 0):
         return False, y
     return (True if np.all(signs.mid - signs.rad > 0) else None), y
@@ -353,12 +350,9 @@ class Growing:
     high: float
     way: Behaviour
 
+    @np.errstate(all="ignore")
     def found(self, stiffness: Stiffness, motions: Motions) -> Ball | None:
         """The motion x, (k,), if it is proven to be there."""
-        with np.errstate(all="ignore"):
-            return self._found(stiffness, motions)
-
-    def _found(self, stiffness: Stiffness, motions: Motions) -> Ball | None:
         k = len(motions.signed)
         slides, touching = self.way.slides, self.way.touching
         if motions.unsure or not 0 < self.low < self.high < np.inf or len(touching) != len(motions.touching):
