@@ -14,7 +14,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 from fractions import Fraction
-from functools import partial
+from functools import cached_property, partial
 from itertools import pairwise
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -27,7 +27,7 @@ from enumsol.arithmetic.rationals import as_objects
 from enumsol.condensation.enclosure import NotEnclosedError, scaled
 from enumsol.support.deadlines import look, tell
 from enumsol.trusted.arcs.selection_balls import ArcSystem
-from enumsol.trusted.arcs.taylor import AlphaFunctions, ball_of, column, matrix, precision, upper, uppers
+from enumsol.trusted.arcs.taylor import AlphaFunctions, ball_of, column, matrix, precision, sign_of, upper, uppers
 from enumsol.trusted.at_alpha import VerifiedSelection, conditions_of
 from enumsol.trusted.selection import Selection
 
@@ -87,18 +87,22 @@ class PreciseSelection:
 
     Parameters
     ----------
-    system : PreciseSystem
+    system : ArcSystem
+        In many digits.
     codes : p status codes, complete
 
     Attributes
     ----------
     rows : Selection
-    functions : AlphaFunctions
     """
 
     def __init__(self, system: ArcSystem[NDArray[Any]], codes: Sequence[int]) -> None:
-        self.system = system
-        self.rows = rows = Selection(codes, len(system.reach))
+        self.system, self.rows = system, Selection(codes, len(system.reach))
+
+    @cached_property
+    def functions(self) -> AlphaFunctions:
+        """Its conditions over alpha."""
+        system, rows = self.system, self.rows
         with precision():
             parts = []
             for (M, b, C, c), unit in zip(system.equations(rows), (1, 0), strict=True):
@@ -106,7 +110,7 @@ class PreciseSelection:
                 table = matrix([*C.tolist(), [arb(0)] * len(rows.unknown)])
                 parts.append((matrix(M.tolist()), column(b.tolist()), table, column([*c.tolist(), arb(unit)])))
         constant = not np.any(system.F1[[*rows.slip, *rows.stick]])
-        self.functions = AlphaFunctions(*zip(*parts, strict=True), constant)
+        return AlphaFunctions(*zip(*parts, strict=True), constant)
 
     def expansion(self, low: Number, high: Number) -> ShortExpansion | None:
         """The conditions over [low, high], also where the matrix may be singular; None where that is too long."""
@@ -123,22 +127,32 @@ class PreciseSelection:
             return bordered if found is None or (bordered is not None and bordered.shift < found.shift / 2) else found
 
     def forces(self, alpha: Fraction) -> tuple[NDArray[Any], NDArray[Any]] | None:
-        """lambda and w as 2p arb each."""
-        system, rows, contact = self.system, self.rows, 2 * self.rows.p
+        """lambda and w as 2p arb each; None where the selection is not proven regular."""
+        system, rows, contact = self.system, self.rows, slice(2 * self.rows.p)
         with precision():
-            a = ball_of(alpha)
-            solved = self.functions.solve(a)
-            if solved is None:
-                return None
-            force = rows.forces(as_objects(solved.entries()), self.friction(a), arb(0))
-            w = system.g0 + a * system.g1 - system.S @ force
-            w[rows.unknown] = arb(0)
-            return force[:contact], w[:contact]
+            F, g = self.friction(alpha), system.g0 + ball_of(alpha) * system.g1
+            W, y = rows.columns(system.S, F), np.empty(0, dtype=object)
+            if len(rows.unknown):
+                try:
+                    solved = matrix(W[rows.unknown].tolist()).solve(column(g[rows.unknown].tolist()))
+                except ZeroDivisionError:
+                    return None
+                y = as_objects(solved.entries())
+                g = g - W @ y
+                g[rows.unknown] = arb(0)
+            return rows.forces(y, F, arb(0))[contact], g[contact]
 
-    def friction(self, alpha: arb) -> NDArray[Any]:
+    def index(self, alpha: Fraction) -> int:
+        """Sign of det M, 0 where it is not proven."""
+        with precision():
+            M = matrix(self.rows.matrix(self.system.S, self.friction(alpha)).tolist())
+            return sign_of(M.det()) if M.nrows() else 1
+
+    def friction(self, alpha: Fraction) -> NDArray[Any]:
         """F at an alpha, p arb."""
-        first, slope = (self.system.exact(part) for part in (self.system.F0, self.system.F1))
-        return np.asarray(first + alpha * slope)
+        with precision():
+            first, slope = (self.system.exact(part) for part in (self.system.F0, self.system.F1))
+            return np.asarray(first + ball_of(alpha) * slope)
 
     def positions(self, alpha: Fraction, offset: Ball) -> Ball | None:
         """Bt u of all nodes for every slip offset in a ball around the system's own; theory, (13.2).
@@ -201,13 +215,12 @@ def _verified(
 ) -> VerifiedSelection | None:
     selection = PreciseSelection(system, codes)
     with precision():
-        a = ball_of(alpha)
-        found, sign = selection.forces(alpha), selection.functions.determinant_sign(a)
-        if found is None or not sign:
+        found, index = selection.forces(alpha), selection.index(alpha)
+        if found is None or not index:
             return None
         force, w = (values / system.exact(unit) for values, unit in zip(found, units, strict=True))
-        balls = (_in_floats(values) for values in (force, w, conditions_of(codes, force, w, selection.friction(a))))
-        return VerifiedSelection(*balls, sign)
+        slack = conditions_of(codes, force, w, selection.friction(alpha))
+        return VerifiedSelection(*map(_in_floats, (force, w, slack)), index)
 
 
 def _in_floats(values: NDArray[Any]) -> Ball:

@@ -87,7 +87,8 @@ class ArcSystem(Generic[_Numbers]):
 
     def equations(self, rows: Selection) -> list[tuple[_Numbers, _Numbers, _Numbers, _Numbers]]:
         """M and g_R, C and c of a selection (see Selection.inequalities): at alpha = 0, and by how much they grow."""
-        found, reach, zero = [], self.exact(self.reach), 0.0 if isinstance(self.S, Ball) else 0 * self.S[0, 0]
+        found, reach = [], self.exact(self.reach)
+        zero = 0.0 if isinstance(self.S, Ball) else type(self.S[0, 0])(0)
         for g, friction, unit in ((self.g0, self.F0, 1), (self.g1, self.F1, 0)):
             F = self.exact(friction)
             W = rows.columns(self.S, F, unit)

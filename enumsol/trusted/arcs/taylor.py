@@ -258,11 +258,7 @@ class AlphaFunctions:
     @cached_property
     def _constant_index(self) -> int:
         """Sign of det M where M does not depend on alpha."""
-        return self.determinant_sign(arb(0))
-
-    def determinant_sign(self, a: arb) -> int:
-        """Sign of det M for every alpha in a ball, 0 where it is not proven."""
-        return sign_of((self.M[0] + self.M[1] * a).det()) if self.M[0].nrows() else 1
+        return sign_of(self.M[0].det()) if self.M[0].nrows() else 1
 
     def solve(self, a: arb, algorithm: str | None = None) -> arb_mat | None:
         """Unknowns for every alpha in a ball; None where M is not proven regular."""
