@@ -56,10 +56,6 @@ class _Candidate(Generic[_Form, _Relaxation]):
     factor: Floats
     relaxation: _Relaxation
 
-    @property
-    def log_determinant(self) -> float:
-        return 2.0 * float(np.sum(np.log(np.diagonal(self.factor))))
-
 
 class FormAscent(ABC, Generic[_Form, _Relaxation]):
     """Newton's method for the multipliers of a form that bounds one partial assignment.
@@ -125,7 +121,8 @@ class FormAscent(ABC, Generic[_Form, _Relaxation]):
         step, promised = newton
 
         def merit(candidate: _Candidate[_Form, _Relaxation]) -> float:
-            barriers = candidate.log_determinant + _BARRIER * self._barrier(candidate.multipliers)
+            log_determinant = 2.0 * float(np.sum(np.log(np.diagonal(candidate.factor))))
+            barriers = log_determinant + _BARRIER * self._barrier(candidate.multipliers)
             return scale * candidate.relaxation.bound + barriers
 
         length = 1.0

@@ -104,7 +104,8 @@ class StabilitySearch:
         while low < last:
             if self._try(low, np.inf) or (low and self._far and self._try(low, np.inf, *self._far)):
                 return
-            far = next((mu for mu in (STRIDE**2 * high, STRIDE * high) if self._serve_to(low, mu)), None)
+            serving = (mu for mu in (STRIDE**2 * high, STRIDE * high) if serve_at(self.stiffness, self.motions, mu))
+            far = next((mu for mu in serving if self._try(low, mu)), None)
             if far is None:
                 yield from self._divided(low, high, _NARROW, self._by_plain)
             low = high if far is None else far
@@ -112,10 +113,6 @@ class StabilitySearch:
             if self._limit is None and low > largest_eigenvalue(self.stiffness):
                 break
         yield low, np.inf
-
-    def _serve_to(self, low: float, high: float) -> bool:
-        """True if plain numbers serve in a long range."""
-        return serve_at(self.stiffness, self.motions, high) and self._try(low, high)
 
     @cached_property
     def _limit(self) -> Floats | None:
