@@ -295,7 +295,7 @@ class CondensedEnclosure(Sealed):
             # scaling rounds nothing but what underflows
             pair = force[:, None] / length[None, :]
             S, S_rad = self.S * pair, self.S_rad * pair + TINY
-        if not np.all(pair >= _LEAST_PAIR) or not all(np.all(np.isfinite(array)) for array in (S, S_rad)):
+        if not np.all(pair >= LEAST_PAIR) or not all(np.all(np.isfinite(array)) for array in (S, S_rad)):
             raise NotEnclosedError(_OVERFLOW)
         return S, S_rad, g, g_rad
 
@@ -329,7 +329,7 @@ def enclosure_of(problem: ProblemData) -> CondensedEnclosure:
 
 
 #: Smallest quotient of units, far above underflow.
-_LEAST_PAIR = 2.0**-1000
+LEAST_PAIR = 2.0**-1000
 _OVERFLOW = "the condensed problem over- or underflows float64; expected data in other units"
 _PART = "these balls are not those of a whole problem"
 _POWERS = "units of force and length must be powers of two"

@@ -34,7 +34,6 @@ if TYPE_CHECKING:
     from enumsol.support.array_types import ArrayLike, Floats
 
 Verdict = Literal["runs away", "does not run away", "undecided"]
-_OPEN, _PLUS, _MINUS = ContactStatus.OPEN, ContactStatus.SLIP_PLUS, ContactStatus.SLIP_MINUS
 _CODES = {status: code for code, status in enumerate(STATUSES)} | {ContactStatus.SLIP: SLIP}
 
 
@@ -165,10 +164,11 @@ class Stabilities:
         """Why the statuses of a root do not tell enough."""
         if root.enclosure is None:
             return "the root was found in floats, and its statuses are not proven"
-        if any(_OPEN in root.active[i] for i in self._unsure(root)):
+        if any(ContactStatus.OPEN in root.active[i] for i in self._unsure(root)):
             return "a contact node may be open or touch, which the bounds of this root do not decide"
         rubs = np.any([F.mid > 0 for F in friction_over(self.problem, root.alpha, root.alpha)], axis=0)
-        if any(rubs[i] and {_PLUS, _MINUS} <= root.active[i] for i in self._unsure(root)):
+        limits = {ContactStatus.SLIP_PLUS, ContactStatus.SLIP_MINUS}
+        if any(rubs[i] and limits <= root.active[i] for i in self._unsure(root)):
             return "a contact node may be at either limit, which the bounds of this root do not decide"
         return None
 

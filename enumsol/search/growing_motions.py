@@ -26,10 +26,10 @@ if TYPE_CHECKING:
 
 #: From one end of a range of mu to the other.
 STRIDE = 16.0
-#: Nodes at their limit up to which all sets of them are tried, and degrees of freedom up to which a spectrum is known.
+#: Nodes at their limit up to which all sets of them are tried or counted, and degrees of freedom up to which a spectrum is known.
 _ALL_SETS, _SPECTRUM = 8, 1500
-#: Nodes up to which all sets of them are counted for one certificate, and loads that are tried for it.
-_COUNTED, _LOADS = 8, 12
+#: Loads that are tried for one certificate.
+_LOADS = 12
 #: mu at which signs of determinants are compared within a range.
 _SAMPLES = 48
 #: Relative widths in which a motion is looked for, narrow ones first.
@@ -286,7 +286,7 @@ def _push(L: Floats) -> Floats | None:
 def _load(L: Floats) -> Floats | None:
     """q for which the signs of all solutions of 0 <= x, q + L x >= 0 are known best, if they do not add up to 1."""
     k = len(L)
-    if not 0 < k <= _COUNTED or L.shape != (k, k):
+    if not 0 < k <= _ALL_SETS or L.shape != (k, k):
         return None
     unit = 1.0 / np.sqrt(np.maximum(np.abs(L.diagonal()), np.finfo(float).tiny))
     scaled = L * unit[:, None] * unit

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any, Generic, TypeVar
 import numpy as np
 
 from enumsol.arithmetic.balls import SAFE, TINY, Ball, hull, solution
-from enumsol.condensation.enclosure import CondensedEnclosure, EnclosedSystem, NotEnclosedError, RigidRows
+from enumsol.condensation.enclosure import LEAST_PAIR, CondensedEnclosure, EnclosedSystem, NotEnclosedError, RigidRows
 from enumsol.trusted.floating_bounds import is_unbalanced, motion_against
 from enumsol.trusted.selection import Selection, joined, signed
 
@@ -54,8 +54,7 @@ class ArcSystem(Generic[_Numbers]):
         """A problem, and what encloses it, or the body on springs if nothing holds it, in double arithmetic."""
         with np.errstate(over="ignore", invalid="ignore"):  # what overflows proves nothing
             pair = force[:, None] / length[None, :]
-            # smallest quotient of units, far above underflow
-            if not np.all(pair >= 2.0**-1000):
+            if not np.all(pair >= LEAST_PAIR):
                 raise NotEnclosedError("the units of the arcs underflow float64; expected data in other units")
             F0, F1 = (np.asarray(part, dtype=np.float64) for part in enclosure.problem.affine_friction)
             g0 = Ball(enclosure.g0 / length, enclosure.g0_rad / length + TINY)
