@@ -16,7 +16,7 @@ import scipy.sparse as sp
 
 from enumsol.search.growing_motions import (
     STRIDE,
-    GrowingMotions,
+    growing_between,
     largest_eigenvalue,
     serve_at,
     serves,
@@ -88,8 +88,8 @@ class StabilitySearch:
             # neither a motion nor a range without end can be proven
             return Proven((), (), ((0.0, np.inf),))
         gaps = _joined(list(self._plain()))
-        search = GrowingMotions(self.stiffness, self.motions)
-        growing = [] if self.motions.unsure else [found for low, high in gaps for found in search.between(low, high)]
+        ranges = () if self.motions.unsure else gaps
+        growing = [found for ends in ranges for found in growing_between(self.stiffness, self.motions, *ends)]
         growing.sort(key=lambda item: -item[0].low)
         if not growing and self._limit is not None:
             gaps = [gap for ends in gaps for gap in self._divided(*ends, _NARROWEST, self._by_weights)]
