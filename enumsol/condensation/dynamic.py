@@ -110,7 +110,8 @@ class DynamicStiffness:
         springs: Any = None,
         rest: Ball | None = None,
     ) -> None:
-        self.A, self.M, self.rows, self._modes, self.springs = A, M, rows, modes, springs
+        self.A, self.M, self.rows, self.springs = A, M, rows, springs
+        self._modes = np.zeros((A.shape[0], 0)) if modes is None else modes
         self._rest, self._known = rest, dict[float, Ball | None]()
 
     def at(self, mu: float) -> Ball | None:
@@ -127,7 +128,7 @@ class DynamicStiffness:
     @property
     def held(self) -> bool:
         """True if A is positive definite: K(mu) is there for some mu < 0, too."""
-        return self._modes is None or not self._modes.shape[1]
+        return not self._modes.shape[1]
 
     @property
     def known(self) -> list[float]:

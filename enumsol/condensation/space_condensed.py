@@ -385,8 +385,7 @@ class AlphaSpace:
             along = replace(along, g=Ball.joined(along.g, rigid.h), g_turn=Ball.joined(along.g_turn, turn))
             rigid = replace(rigid, h=Ball(rigid.h.mid, (rigid.h.rad + turn.size) * SAFE))
         disc = Ball(disc.mid, (disc.rad + disc_turn.size) * SAFE)
-        of_piece = {"disc": disc, "turn": along, "rows": rigid, "same": held}
-        return replace(held, g=whole.mid, g_rad=whole.rad, **of_piece)
+        return replace(held, g=whole.mid, g_rad=whole.rad, disc=disc, turn=along, rows=rigid, same=held)
 
     @cached_property
     def moved(self) -> Ball:

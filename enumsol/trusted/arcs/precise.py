@@ -79,7 +79,8 @@ def _bordered(
     unit = as_objects([arb((1, exponent)) for exponent in exponents])
     reach = np.ldexp(most, [-exponent for exponent in exponents])
     exactly = np.array_equal(np.ldexp(reach, exponents), most)
-    return held.bordered((G * unit).T, *(loads * unit), reach) if exactly else None
+    h, change = loads * unit
+    return held.bordered((G * unit).T, h, change, reach) if exactly else None
 
 
 class PreciseSelection:
@@ -110,7 +111,8 @@ class PreciseSelection:
                 table = matrix([*C.tolist(), [arb(0)] * len(rows.unknown)])
                 parts.append((matrix(M.tolist()), column(b.tolist()), table, column([*c.tolist(), arb(unit)])))
         constant = not np.any(system.F1[[*rows.slip, *rows.stick]])
-        return AlphaFunctions(*zip(*parts, strict=True), constant)
+        M, g, C, c = zip(*parts, strict=True)
+        return AlphaFunctions(M, g, C, c, constant)
 
     def expansion(self, low: Number, high: Number) -> ShortExpansion | None:
         """The conditions over [low, high], also where the matrix may be singular; None where that is too long."""
@@ -220,7 +222,7 @@ def _verified(
             return None
         force, w = (values / system.exact(unit) for values, unit in zip(found, units, strict=True))
         slack = conditions_of(codes, force, w, selection.friction(alpha))
-        return VerifiedSelection(*map(_in_floats, (force, w, slack)), index)
+        return VerifiedSelection(_in_floats(force), _in_floats(w), _in_floats(slack), index)
 
 
 def _in_floats(values: NDArray[Any]) -> Ball:

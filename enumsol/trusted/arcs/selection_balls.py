@@ -87,11 +87,12 @@ class ArcSystem(Generic[_Numbers]):
     def equations(self, rows: Selection) -> list[tuple[_Numbers, _Numbers, _Numbers, _Numbers]]:
         """M and g_R, C and c of a selection (see Selection.inequalities): at alpha = 0, and by how much they grow."""
         found, reach = [], self.exact(self.reach)
-        zero = 0.0 if isinstance(self.S, Ball) else type(self.S[0, 0])(0)
+        zero: Any = 0.0 if isinstance(self.S, Ball) else type(self.S[0, 0])(0)
         for g, friction, unit in ((self.g0, self.F0, 1), (self.g1, self.F1, 0)):
             F = self.exact(friction)
             W = rows.columns(self.S, F, unit)
-            found.append((W[rows.unknown], g[rows.unknown], *rows.inequalities(W, g, F, zero, unit, reach)))
+            C, c = rows.inequalities(W, g, F, zero, unit, reach)
+            found.append((W[rows.unknown], g[rows.unknown], C, c))
         return found
 
     @property
