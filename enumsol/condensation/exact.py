@@ -314,10 +314,8 @@ class ExactCondensed:
         dg = lcm(*(int(v.q) for v in (*self.g0, *self.g1)))
         dF = lcm(*(int(v.q) for v in (*self.F0, *self.F1)))
         rows = tuple(tuple(_times(v, dS) for v in row) for row in self.rows)
-        (g0, g1), (F0, F1) = (
-            (tuple(_times(v, unit) for v in part) for part in parts)
-            for parts, unit in (((self.g0, self.g1), dg), ((self.F0, self.F1), dF))
-        )
+        g0, g1 = (tuple(_times(v, dg) for v in part) for part in (self.g0, self.g1))
+        F0, F1 = (tuple(_times(v, dF) for v in part) for part in (self.F0, self.F1))
         return replace(self, rows=rows, g0=g0, g1=g1, F0=F0, F1=F1, friction_unit=dF, force=fmpq(dS, dg))
 
     def at(self, alpha: object) -> tuple[tuple[Any, ...], tuple[Any, ...]]:
