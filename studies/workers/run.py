@@ -69,7 +69,7 @@ def crew(kind, workers):
     else:
         with (
             dask.config.set({"distributed.worker.profile.enabled": kind == "dask"}),
-            LocalCluster(n_workers=workers, threads_per_worker=1, dashboard_address=None) as cluster,
+            LocalCluster(n_workers=workers, threads_per_worker=1, dashboard_address=":0") as cluster,
             Client(cluster) as client,
         ):
             client.gather(client.map(_warm, range(4 * workers), pure=False))
