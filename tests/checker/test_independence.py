@@ -77,7 +77,7 @@ SHARED = {
         ),
     },
     "trusted.running_away": None,
-    "trusted.quadratic_forms": {"EnclosedForm", "QuadraticForm", "equations_of"},
+    "trusted.quadratic_forms": {"EnclosedForm", "QuadraticForm", "equations_of", "multiplied"},
     "trusted.status_rows": None,
     "trusted.space.sector_margins": {"SlipForm"},
     "trusted.space.sector_rows": None,
