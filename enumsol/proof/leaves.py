@@ -364,7 +364,7 @@ class Alone(ClosingRecord):
     def holds(self, system: EnclosedSystem, codes: Codes, errors: float = 1.0, near: Floats | None = None) -> Any:
         """The only solution below the assignment, None where that is not proven (theory, sections 6.13 and 12.6).
 
-        A VerifiedSelection; in 3D a SpaceRoot, or an OnlySolution where no leaf is named, near these normal forces, by
+        A VerifiedSelection; in 3D a SpaceRoot, or a LooseSolution where no leaf is named, near these normal forces, by
         default those of the enclosure. ``errors`` as of Excluded.
         """
         if self.strengths is not None and self.terms is not None:

@@ -1,8 +1,9 @@
-"""A solution in 3D by Newton's method in isotropic variables (theory, section 12.6), in floats."""
+"""Newton's method in 3D in floats: the projection P, and a solution in isotropic variables (theory, section 12.6)."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -11,76 +12,91 @@ from enumsol.support.deadlines import look
 
 if TYPE_CHECKING:
     from enumsol.condensation.space_condensed import SpaceSystem
-    from enumsol.support.array_types import Floats
+    from enumsol.support.array_types import Floats, Indices
 
 
 #: Residual at which a point counts as a solution, relative to forces of size one.
 _SOLVED = 1e-10
 
 
+def projected(tau: Indices, F: Floats, slope: Floats, z: Floats, rows: Floats) -> tuple[Floats, Floats]:
+    """P of arguments z, the last of them that of F, and a derivative of it times rows, (m,) and (m, n).
+
+    Parameters
+    ----------
+    tau : (p, 2) array of int, places of both components, -1 where there is none
+    F, slope : (p,) arrays
+        Radii of the discs over lambda_n, and their derivatives by the last argument.
+    z : (m + 1,) array
+        All lambda_n first; what is behind 3p of them P keeps.
+    rows : (m + 1, n) array
+    """
+    p, m = len(tau), len(z) - 1
+    has, kept = tau >= 0, np.arange(3 * p, m)
+    normal, tangent = np.maximum(z[:p], 0.0), np.where(has, z[tau], 0.0)
+    most, length = F * normal, np.linalg.norm(tangent, axis=1)
+    touches = z[:p] > 0
+    sticks, divisor = touches & (length <= most), np.where(length > 0, length, 1.0)[:, None]
+    ratio = np.where(sticks, 1.0, most / divisor[:, 0])[:, None]
+    e = np.where(sticks, 0.0, 1.0)[:, None] * tangent / divisor
+    pushed = np.where(touches, F, 0.0)[:, None] * rows[:p] + (slope * normal)[:, None] * rows[m]
+    along = e[:, :1] * rows[tau[:, 0]] + e[:, 1:] * rows[tau[:, 1]]
+    P, moved = np.zeros(m), np.zeros((m, rows.shape[1]))
+    P[kept], moved[kept] = z[kept], rows[kept]
+    P[:p], moved[:p] = normal, touches[:, None] * rows[:p]
+    for k in (0, 1):
+        own = np.flatnonzero(has[:, k])
+        at, towards = tau[own, k], e[own, k, None]
+        P[at] = (ratio * tangent)[own, k]
+        moved[at] = ratio[own] * (rows[at] - towards * along[own]) + towards * pushed[own]
+    return P, moved
+
+
 @dataclass(frozen=True)
 class Isotropic:
-    """w = g - S y for y (p, 3): lambda_n and both tau, those that do not occur with equations tau = 0 of their own.
+    """w = g - S y in the variables (lambda_n, tau) of a system without its units.
 
     Attributes
     ----------
-    S : (3 p, 3 p) array
-    g : (3 p,) array
-    unit : (3 p,) array
+    S : (m, m) array
+    g : (m,) array
+    unit : (m,) array
         Powers of two: S is scaled back by them before a system is solved.
-    rho : (3 p,) array
+    tau : (p, 2) array of int
+        Places of the tau of every node, -1 where there is none.
+    rho : (m,) array
         Steps of the natural map y - P(y + rho w), one for lambda_n and one for tau of every node.
     """
 
     S: Floats
     g: Floats
     unit: Floats
+    tau: Indices
     rho: Floats
 
     @classmethod
     def of(cls, system: SpaceSystem) -> Isotropic:
         """The problem of a scaled system."""
-        p, tau = system.p, system.tau
-        places = np.column_stack([np.arange(p), tau]).ravel()
-        occurs = places >= 0
-        unit = np.where(occurs, system.unit[places], 1.0)
-        both = occurs[:, None] & occurs[None, :]
-        S = np.where(both, system.S[np.ix_(places, places)] / np.outer(unit, unit), 0.0)
-        S[~occurs, ~occurs] = 1.0
-        rho = 1.0 / np.diagonal(S).reshape(p, 3)
-        friction = np.min(np.where(occurs.reshape(p, 3)[:, 1:], rho[:, 1:], np.inf), axis=1, keepdims=True)
-        rho[:, 1:] = np.where(np.isfinite(friction), friction, 1.0)
-        return cls(S, np.where(occurs, system.g[places] / unit, 0.0), unit, rho.ravel())
+        S = system.S / np.outer(system.unit, system.unit)
+        rho = 1.0 / np.diagonal(S)
+        for t in system.tau:
+            rho[t[t >= 0]] = np.min(rho[t[t >= 0]], initial=np.inf)
+        return cls(S, system.g / system.unit, system.unit, system.tau, rho)
 
     def displacements(self, y: Floats) -> Floats:
-        """w, (p, 3)."""
-        return (self.g - self.S @ y.ravel()).reshape(-1, 3)
+        """w, (m,)."""
+        return self.g - self.S @ y
 
     def solution(self, near: Floats | None = None) -> Floats | None:
-        """A solution y, (p, 3), or None: by Newton's method from one near it or from 0, else with growing discs."""
-        found = None if near is None else self._newton(near.ravel(), 1.0)
+        """A solution y, (m,), or None: by Newton's method from one near it or from 0, else with growing discs."""
+        found = None if near is None else self.near(near)
         if found is None:
-            found = self._newton(np.zeros_like(self.g), 1.0)
-        if found is None:
-            found = self._grown()
-        return None if found is None else found.reshape(-1, 3)
+            found = self.near(np.zeros_like(self.g))
+        return self._grown() if found is None else found
 
-    def near(self, y: Floats, system: SpaceSystem) -> Floats | None:
-        """A solution like y near one, both as ``system`` has them, (m,); None if Newton's method finds none."""
-        found = self._newton(self.by_node(y, system).ravel(), 1.0)
-        if found is None:
-            return None
-        near, found = np.empty_like(y), found.reshape(-1, 3)
-        near[: system.p] = found[:, 0]
-        occurs = system.tau >= 0
-        near[system.tau[occurs]] = (found[:, 1:] / np.where(occurs, system.unit[system.tau], 1.0))[occurs]
-        return near
-
-    @staticmethod
-    def by_node(y: Floats, system: SpaceSystem) -> Floats:
-        """Forces as ``system`` has them, (m,), as they are here, (p, 3)."""
-        units = np.where(system.tau >= 0, system.unit[system.tau], 1.0)
-        return np.column_stack([y[: system.p], system.tangential(y) * units])
+    def near(self, y: Floats) -> Floats | None:
+        """A solution like y near one; None if Newton's method finds none."""
+        return self._newton(y, 1.0)
 
     def _grown(self) -> Floats | None:
         y = self._newton(np.zeros_like(self.g), 0.0)
@@ -99,7 +115,7 @@ class Isotropic:
         return y if radius >= 1.0 else None
 
     def _newton(self, y: Floats, radius: float) -> Floats | None:
-        """A solution for discs |tau| <= radius lambda_n from a point near it, (3 p,)."""
+        """A solution for discs |tau| <= radius lambda_n from a point near it, (m,)."""
         H, J = self._natural(y, radius)
         size, best, waited = self._merit(H), np.inf, 0
         for _ in range(40):
@@ -132,25 +148,12 @@ class Isotropic:
 
     def _natural(self, y: Floats, radius: float) -> tuple[Floats, Floats]:
         """The natural map y - P(y + rho w), with discs as large as y + rho w has lambda_n, and its Jacobian."""
-        m = len(y)
-        z, dz = y + self.rho * (self.g - self.S @ y), np.eye(m) - self.rho[:, None] * self.S
-        H, J = y.copy(), np.eye(m)
-        normal = np.arange(0, m, 3)
-        closed = z[normal] > 0
-        most = radius * np.where(closed, z[normal], 0.0)
-        slope = radius * np.where(closed[:, None], dz[normal], 0.0)
-        H[normal[closed]] -= z[normal[closed]]
-        J[normal[closed]] -= dz[normal[closed]]
-        pair = z.reshape(-1, 3)[:, 1:]
-        length = np.linalg.norm(pair, axis=1)
-        inside = length <= most
-        safe = np.where(inside, 1.0, length)
-        e = pair / safe[:, None]
-        first, second = normal + 1, normal + 2
-        along = e[:, :1] * dz[first] + e[:, 1:] * dz[second]
-        bend = (most / safe)[:, None]
-        for k, t in enumerate((first, second)):
-            H[t] -= np.where(inside, pair[:, k], most * e[:, k])
-            across = slope * e[:, k, None] + bend * (dz[t] - e[:, k, None] * along)
-            J[t] -= np.where(inside[:, None], dz[t], across)
-        return H, J
+        F, z = np.full(len(self.tau), radius), y + self.rho * self.displacements(y)
+        P, moved = projected(self.tau, F, 0.0 * F, np.append(z, 0.0), self._moves)
+        return y - P, np.eye(len(y)) - moved
+
+    @cached_property
+    def _moves(self) -> Floats:
+        """The derivative of y + rho w, with a row for the argument of F, which does not change."""
+        m = len(self.g)
+        return np.vstack([np.eye(m) - self.rho[:, None] * self.S, np.zeros((1, m))])

@@ -62,6 +62,25 @@ def is_within(code: int, over: int) -> bool:
     return both and sectors.contains(over - sectors.SECTORS, code - sectors.SECTORS)
 
 
+def leaf_code(code: int, tau: Sequence[int], towards: Sequence[float], level: int) -> int:
+    """The code of a node in a leaf, by its status: open, stick, and any other one for contact with slip.
+
+    Parameters
+    ----------
+    tau : places of both components, -1 where there is none
+    towards : (2,), of friction over its coefficients, or of the slip
+    level : of the sector
+    """
+    occurs = [k for k in range(2) if tau[k] >= 0]
+    if code == OPEN or not occurs:
+        return OPEN if code == OPEN else FRICTIONLESS
+    if code == STICK:
+        return STICK
+    if len(occurs) == 1:
+        return SLIP_PLUS if towards[occurs[0]] > 0 else SLIP_MINUS
+    return sectors.SECTORS + sectors.holding(towards, level)
+
+
 @lru_cache(maxsize=_KEPT)
 def row_sign(code: int, row: Row) -> int:
     """What the multiplier of a row may be at a node of this code."""

@@ -19,8 +19,6 @@ if TYPE_CHECKING:
 
 #: Cosine and sine of numerical libraries, and what is made of two of them here, are off by no more.
 LIBRARY = 64 * UNIT
-#: How often derivatives over a box are bounded by their own derivatives.
-_ROUNDS = 2
 
 
 def turned_by(centre: Floats, angle: Floats) -> tuple[Floats, Floats]:
@@ -105,7 +103,8 @@ class AngleBox:
         across, along = (rows @ part for part in (self.across, self.along))
         middle = tuple(rows @ part for part in (point.across, point.along))
         more = (1.0 + gamma(2 * len(radius) + 8)) * SAFE
-        for _ in range(_ROUNDS):
+        # twice bounded by their own derivatives
+        for _ in range(2):
             # by (12.4a), and with g = share / (1 + s share), whose bounds are ``swept``,
             # dp_j / ds = p_j g_j - sum q_k g_k z_kj, and the same for q with t in place of z. Forces here are
             # 1 + s share times d or its turn; what needs them for d alone has that too, as the radii hold all s
