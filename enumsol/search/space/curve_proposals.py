@@ -156,13 +156,17 @@ def curve_point(problem: AlphaProblem, x: Floats, border: Floats) -> CurvePoint 
     x, row, asked = x / unit, border * unit, np.zeros((m + 1, 2))
     asked[m, 1] = 1.0
     moves = np.vstack([2.0 * problem.part.mid - np.eye(m, m + 1), np.eye(1, m + 1, m)])
+    at = np.column_stack([np.arange(problem.p), problem.places, np.full(problem.p, m)])
+    has, kept = at[:, :3] >= 0, np.arange(3 * problem.p, m)
     with np.errstate(all="ignore"):
         for _ in range(_STEPS):
             y = problem.part.mid @ x + problem.offset.mid
             z = np.append(2.0 * y - x[:m], x[m])
-            P, moved = projected(problem.places, problem.F0 + z[m] * problem.F1, problem.F1, z, moves)
+            P, D = projected(problem.places, problem.F0 + z[m] * problem.F1, problem.F1, z)
             asked[:m, 0] = P - y
-            B = np.vstack([problem.part.mid - moved, row])
+            B = np.vstack([problem.part.mid, row])
+            B[kept] -= moves[kept]
+            B[at[:, :3][has]] -= (D @ moves[at])[has]
             try:
                 found = np.linalg.solve(B, asked)
             except np.linalg.LinAlgError:

@@ -103,7 +103,7 @@ def _relaxed(space: AlphaSpace, alpha: Fraction) -> SpaceSystem:
 
 
 class PieceBounds:
-    """The numbers (12.21a) of a piece, as functions of multipliers m of rows at its lower, then its upper end, (2 n,).
+    """The numbers (12.19) of a piece, as functions of multipliers m of rows at its lower, then its upper end, (2 n,).
 
     They are q'm - |v + B m|^2 / 4; the last one is for what lies between the ends.
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import cached_property
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -19,8 +18,8 @@ if TYPE_CHECKING:
 _SOLVED = 1e-10
 
 
-def projected(tau: Indices, F: Floats, slope: Floats, z: Floats, rows: Floats) -> tuple[Floats, Floats]:
-    """P of arguments z, the last of them that of F, and a derivative of it times rows, (m,) and (m, n).
+def projected(tau: Indices, F: Floats, slope: Floats, z: Floats) -> tuple[Floats, Floats]:
+    """P of arguments z, the last of them that of F, (m,), and derivatives by (n, t1, t2) and the last one, (p, 3, 4).
 
     Parameters
     ----------
@@ -29,27 +28,20 @@ def projected(tau: Indices, F: Floats, slope: Floats, z: Floats, rows: Floats) -
         Radii of the discs over lambda_n, and their derivatives by the last argument.
     z : (m + 1,) array
         All lambda_n first; what is behind 3p of them P keeps.
-    rows : (m + 1, n) array
     """
     p, m = len(tau), len(z) - 1
     has, kept = tau >= 0, np.arange(3 * p, m)
     normal, tangent = np.maximum(z[:p], 0.0), np.where(has, z[tau], 0.0)
     most, length = F * normal, np.linalg.norm(tangent, axis=1)
     touches = z[:p] > 0
-    sticks, divisor = touches & (length <= most), np.where(length > 0, length, 1.0)[:, None]
-    ratio = np.where(sticks, 1.0, most / divisor[:, 0])[:, None]
-    e = np.where(sticks, 0.0, 1.0)[:, None] * tangent / divisor
-    pushed = np.where(touches, F, 0.0)[:, None] * rows[:p] + (slope * normal)[:, None] * rows[m]
-    along = e[:, :1] * rows[tau[:, 0]] + e[:, 1:] * rows[tau[:, 1]]
-    P, moved = np.zeros(m), np.zeros((m, rows.shape[1]))
-    P[kept], moved[kept] = z[kept], rows[kept]
-    P[:p], moved[:p] = normal, touches[:, None] * rows[:p]
-    for k in (0, 1):
-        own = np.flatnonzero(has[:, k])
-        at, towards = tau[own, k], e[own, k, None]
-        P[at] = (ratio * tangent)[own, k]
-        moved[at] = ratio[own] * (rows[at] - towards * along[own]) + towards * pushed[own]
-    return P, moved
+    sticks, divisor = touches & (length <= most), np.where(length > 0, length, 1.0)
+    ratio = np.where(sticks, 1.0, most / divisor)[:, None]
+    e = np.where(sticks, 0.0, 1.0 / divisor)[:, None] * tangent
+    P, D = np.zeros(m), np.zeros((p, 3, 4))
+    P[kept], P[:p], P[tau[has]] = z[kept], normal, (ratio * tangent)[has]
+    D[:, 0, 0], D[:, 1:, 0], D[:, 1:, 3] = touches, (touches * F)[:, None] * e, (slope * normal)[:, None] * e
+    D[:, 1:, 1:3] = (ratio * has)[:, :, None] * (np.eye(2) - e[:, :, None] * e[:, None, :])
+    return P, D
 
 
 @dataclass(frozen=True)
@@ -116,7 +108,7 @@ class Isotropic:
 
     def _newton(self, y: Floats, radius: float) -> Floats | None:
         """A solution for discs |tau| <= radius lambda_n from a point near it, (m,)."""
-        H, J = self._natural(y, radius)
+        H, slopes = self._natural(y, radius)
         size, best, waited = self._merit(H), np.inf, 0
         for _ in range(40):
             if size <= _SOLVED:
@@ -125,12 +117,8 @@ class Isotropic:
             if waited > 12:  # so many steps without a merit half as large
                 return None
             look()
-            try:
-                # in the units of the system, in which no row is small
-                step = np.linalg.solve(J / self.unit[:, None] * self.unit, H / self.unit) * self.unit
-            except np.linalg.LinAlgError:
-                return None
-            if not np.all(np.isfinite(step)):
+            step = self._step(H, slopes)
+            if step is None:
                 return None
             share = 1.0
             for _ in range(7):
@@ -139,21 +127,37 @@ class Isotropic:
                 if self._merit(found[0]) < size:
                     break
                 share *= 0.5
-            y, (H, J) = trial, found
+            y, (H, slopes) = trial, found
             size = self._merit(H)
         return y if size <= _SOLVED else None
 
     def _merit(self, H: Floats) -> float:
         return float(np.linalg.norm(H / self.unit))
 
-    def _natural(self, y: Floats, radius: float) -> tuple[Floats, Floats]:
-        """The natural map y - P(y + rho w), with discs as large as y + rho w has lambda_n, and its Jacobian."""
-        F, z = np.full(len(self.tau), radius), y + self.rho * self.displacements(y)
-        P, moved = projected(self.tau, F, 0.0 * F, np.append(z, 0.0), self._moves)
-        return y - P, np.eye(len(y)) - moved
+    def _step(self, H: Floats, D: Floats) -> Floats | None:
+        """The solution of J step = H, J = I - D (I - rho S), solved for where D is not 0; elsewhere step = H."""
+        moving = np.flatnonzero(np.any(D, axis=(1, 2)))
+        at, D = np.column_stack([np.arange(len(self.tau)), self.tau])[moving], D[moving]
+        has, step = at >= 0, H.copy()
+        rows, number = at[has], np.zeros(at.shape, dtype=np.intp)
+        number[has] = np.arange(len(rows))
+        J = (D @ (self.S[at] * self.rho[at][:, :, None]))[has]
+        step[rows] = 0.0
+        given = H[rows] - J @ step
+        J = J[:, rows]
+        for i, j in np.ndindex(3, 3):
+            both = has[:, i] & has[:, j]
+            J[number[both, i], number[both, j]] += (i == j) - D[both, i, j]
+        try:
+            # in the units of the system, in which no row is small
+            unit = self.unit[rows]
+            step[rows] = np.linalg.solve(J / unit[:, None] * unit, given / unit) * unit
+        except np.linalg.LinAlgError:
+            return None
+        return step if np.all(np.isfinite(step)) else None
 
-    @cached_property
-    def _moves(self) -> Floats:
-        """The derivative of y + rho w, with a row for the argument of F, which does not change."""
-        m = len(self.g)
-        return np.vstack([np.eye(m) - self.rho[:, None] * self.S, np.zeros((1, m))])
+    def _natural(self, y: Floats, radius: float) -> tuple[Floats, Floats]:
+        """The natural map y - P(z), z = y + rho w, with discs as large as z has lambda_n, and dP/dz, (p, 3, 3)."""
+        F, z = np.full(len(self.tau), radius), y + self.rho * self.displacements(y)
+        P, D = projected(self.tau, F, 0.0 * F, np.append(z, 0.0))
+        return y - P, D[:, :, :3]

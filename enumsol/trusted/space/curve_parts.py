@@ -94,7 +94,7 @@ class CurveMotion:
         return None if D is None else Ball.joined(self.problem.part - D @ self._Z, Ball.exact(self._border[None]))
 
     def _derivative(self, codes: Sequence[int]) -> Ball | None:
-        """Derivative of the projection P with respect to (z, alpha), by (12.17)."""
+        """Derivative of the projection P with respect to (z, alpha), by (12.11)."""
         m = self.problem.m
         D = Ball(np.zeros((m, m + 1)), np.zeros((m, m + 1)))
         kept = np.arange(3 * self.problem.p, m)
@@ -174,7 +174,7 @@ class CurveMotion:
         return 0 if found is None else _sign(found[m, 0])
 
     def _bent(self, i: int, moved: Ball) -> Ball | None:
-        """The second derivative of F z_n e along a node's speed (12.24)."""
+        """The second derivative of F z_n e along a node's speed (12.26)."""
         found, t = self._direction(i), self.problem.tau[i]
         if found is None:
             return None

@@ -284,7 +284,7 @@ def slopes_by_second(inverse: Ball, point: Ball, box: Ball, beside: Floats) -> B
 def around_middle(
     leaf: Leaf, Y: Floats, k: int, box: tuple[Floats, Floats], over: tuple[State, State]
 ) -> tuple[Ball, Ball, Ball]:
-    """I - Y J_u and -Y J_k of (12.22d) over a box and a piece, and where u is but for z_k (-Y J_k).
+    """I - Y J_u and -Y J_k of (12.22) over a box and a piece, and where u is but for z_k (-Y J_k).
 
     z = (psi, s), u being all of these but z_k. For all zeros in the box u is in (I - Y J_u) u + z_k (-Y J_k) - Y G(c).
     At one alpha there is no s, and nothing along it. ``over``: see ``Leaf.bends``.

@@ -333,7 +333,7 @@ def _box_of_all(leaf: Leaf, angle: Floats, radius: Floats) -> tuple[Floats, Floa
 def _arc_in(leaf: Leaf, angle: Floats, radius: Floats, errors: float) -> LeafArc | None:
     """The arc, if every condition holds all along it or changes its sign once at most.
 
-    Zeros z = (psi, s) of the equations are a graph over one of these unknowns, z_k: with (12.22d), u being the other
+    Zeros z = (psi, s) of the equations are a graph over one of these unknowns, z_k: with (12.22), u being the other
     ones, the right-hand side maps a box of u into its interior for every z_k, so that there is one zero for each of
     them, and these are an arc. A normal force that is left free is between psi and s, and so are rigid modes that the
     equations leave free. ``angle``, ``radius``: a box that holds the directions of all solutions.

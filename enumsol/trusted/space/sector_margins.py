@@ -58,9 +58,9 @@ def swept_margin(
     values: Sequence[Floats],
     errors: float = 1.0,
 ) -> float:
-    """Lower bound between two systems, with multipliers between those of both ends: the least number of (12.21a).
+    """Lower bound between two systems, with multipliers between those of both ends: the least number of (12.19).
 
-    Of a body that nothing holds that of (14.19). Or that of an end, if it is not positive; and of one system that.
+    Of a body that nothing holds that, too. Or that of an end, if it is not positive; and of one system that.
 
     Parameters
     ----------

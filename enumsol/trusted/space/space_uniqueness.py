@@ -219,7 +219,7 @@ def _is_final(code: int, tangents: int) -> bool:
 
 @dataclass(frozen=True)
 class SpaceWeights:
-    """The numbers of the form of theory, (12.7), node by node.
+    """The numbers of the form of theory, (6.9), node by node.
 
     Where there is no tau, components are 0.
 
@@ -273,14 +273,14 @@ class SpaceWeights:
         return _multipliers(system, self.mu, self.kappa, self.nu, self.psi)
 
     def form(self, system: EnclosedSpace, held: Ball | None = None) -> UniqueForm | None:
-        """Q of theory, (12.7); None where it is not proven definite, or not with the squares of some rows."""
+        """Q of theory, (6.9); None where it is not proven definite, or not with the squares of some rows."""
         if not (system.smallest_eigenvalue > 0 and in_range(system)):
             return None
         S, wide = Ball(system.S, system.S_rad), self.wide > 0
         return UniqueForm.of(S, self.multipliers(system), np.where(wide, 1.0, 0.0), self.wide, held)
 
     def gaps_serve(self, system: EnclosedSpace, w: Ball) -> Mask:
-        """Mask of nodes without load whose theta serves for all w in a ball, by their gaps (theory, (12.6))."""
+        """Mask of nodes without load whose theta serves for all w in a ball, by their gaps (theory, (6.8))."""
         unit, p, ones = system.tau_units, len(self.mu), Ball.exact(np.ones(len(self.mu)))
         slip = Ball(system.tangential(w.mid) / unit, system.tangential(w.rad) / unit * SAFE + TINY)
         return _gaps_serve(self, ones.mid, self.psi, ones, (-(w.mid[:p] + w.rad[:p]), slip))

@@ -105,7 +105,7 @@ class AngleBox:
         more = (1.0 + gamma(2 * len(radius) + 8)) * SAFE
         # twice bounded by their own derivatives
         for _ in range(2):
-            # by (12.4a), and with g = share / (1 + s share), whose bounds are ``swept``,
+            # by (12.8), and with g = share / (1 + s share), whose bounds are ``swept``,
             # dp_j / ds = p_j g_j - sum q_k g_k z_kj, and the same for q with t in place of z. Forces here are
             # 1 + s share times d or its turn; what needs them for d alone has that too, as the radii hold all s
             p, q = across.size, along.size
@@ -148,7 +148,7 @@ class Combined(NamedTuple):
     def loosened(self) -> tuple[Ball, Ball]:
         """Over a piece of alpha, those by angles and other free unknowns, (k, q, f), and by s and the latter, (k, f).
 
-        w is affine in them, and what forces along d and across it change w by does not depend on them (12.22f).
+        w is affine in them, and what forces along d and across it change w by does not depend on them (12.21).
         """
         box = self.box
         assert box.share is not None
