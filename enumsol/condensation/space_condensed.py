@@ -75,12 +75,8 @@ class FrictionUnits:
 
     @cached_property
     def tau_scale(self) -> Floats:
-        """By what entries of y are multiplied for ``taus``, shape (p, 2)."""
+        """By what entries of y are multiplied to give tau times ``disc_scale``, shape (p, 2)."""
         return self.tau_units * self.disc_scale[:, None]
-
-    def taus(self, y: Floats) -> Floats:
-        """tau times ``disc_scale``, shape (p, 2)."""
-        return self.tangential(y) * self.tau_scale
 
     def slips(self, w: Floats) -> Floats:
         """v times ``slip_scale``, shape (p, 2)."""

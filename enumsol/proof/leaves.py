@@ -372,10 +372,8 @@ class Alone(ClosingRecord):
         from enumsol.trusted.space import space_uniqueness as space  # in 3D only
 
         given = cast("EnclosedSpace", system)
-        if any(code != UNDECIDED for code in codes):
-            return space.lone_root(given, codes, self.numbers, self.selection, errors)
         if self.selection:
-            return space.only_root(given, self.numbers, self.selection, errors)
+            return space.lone_root(given, codes, self.numbers, self.selection, errors)
         if near is None:
             near = self.enclosure.numbers(len(system.g))[0][: len(codes)]
         return space.only_solution_in_space(given, self.numbers, near, errors)

@@ -8,6 +8,7 @@ import pytest
 from effort import some
 from problems3d import from_compliance, random_compliance
 
+from enumsol.model.statuses import UNDECIDED
 from enumsol.search.space.space_fathoming import SpaceCloser
 from enumsol.search.space.space_newton import Isotropic
 from enumsol.search.space.space_setup import SpaceSolvers
@@ -16,7 +17,7 @@ from enumsol.trusted.space.space_uniqueness import (
     LARGEST_UNIT,
     LooseSolution,
     SpaceWeights,
-    only_root,
+    lone_root,
     only_solution_in_space,
 )
 
@@ -63,7 +64,10 @@ def test_solutions_for_all_data_lie_in_the_balls(degenerate):
         S, g = solvers.enclosed.S, solvers.enclosed.g
         enclosed = replace(solvers.enclosed, S_rad=np.full_like(S, width), g_rad=np.full_like(g, width))
         for numbers, codes, normal in proposed(solvers):
-            found = only_root(enclosed, numbers, codes) if codes else only_solution_in_space(enclosed, numbers, normal)
+            whole = (UNDECIDED,) * len(normal)
+            found = only_solution_in_space(enclosed, numbers, normal)
+            if codes:
+                found = lone_root(enclosed, whole, numbers, codes)
             if found is None:
                 continue
             concluded[type(found)] += 1
@@ -171,7 +175,7 @@ def test_units_beyond_the_largest_are_refused():
     solvers = SpaceSolvers(from_compliance(np.eye(3), np.ones(3), 0.5), 0.0, "verified")
     numbers, codes, normal = proposed(solvers)[0]
     unit = np.where(np.arange(3) > 0, 2.0 * LARGEST_UNIT, 1.0)
-    assert only_root(solvers.enclosed, numbers, codes) is not None
+    assert lone_root(solvers.enclosed, (UNDECIDED,) * len(codes), numbers, codes) is not None
     for enclosed in (replace(solvers.enclosed, unit=units) for units in (unit, 1.0 / unit)):
-        assert only_root(enclosed, numbers, codes) is None
+        assert lone_root(enclosed, (UNDECIDED,) * len(codes), numbers, codes) is None
         assert only_solution_in_space(enclosed, numbers, normal) is None

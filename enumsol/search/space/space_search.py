@@ -81,7 +81,9 @@ class SpaceSplitting:
             return children[:: -1 if force > -w else 1]
         if codes[node] == CONTACT and self._engine.tangents[node] == 1:
             return children
-        tau, v = self._system.taus(relaxation.forces)[node], self._system.slips(relaxation.displacements)[node]
+        system = self._system
+        tau = system.tangential(relaxation.forces)[node] * system.tau_scale[node]
+        v = system.slips(relaxation.displacements)[node]
         towards = tau / (np.linalg.norm(tau) + 1e-300) + v / (np.linalg.norm(v) + 1e-300)
         return sorted(children, key=lambda code: -_towards(code, towards) if code > SECTORS else -10.0)
 

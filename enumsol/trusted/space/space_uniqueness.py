@@ -39,7 +39,7 @@ from enumsol.trusted.space.sector_rows import (
 from enumsol.trusted.uniqueness_forms import Multipliers, RootForm, RootReference, UniqueForm
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Iterator, Sequence
     from fractions import Fraction
     from typing import Self
 
@@ -132,23 +132,6 @@ def only_solution_in_space(
         return None if weights is None else _enclosed(system, weights, normal, errors)
 
 
-def only_root(system: EnclosedSpace, numbers: Floats, codes: Sequence[int], errors: float = 1.0) -> SpaceRoot | None:
-    """The regular root of a leaf, if it is proven that it has one and that there is no other solution at all.
-
-    Parameters and errors as for ``only_solution_in_space``; ``codes`` are those of the leaf.
-    """
-    if not is_complete(system, codes):
-        return None
-    with np.errstate(all="ignore"):
-        weights = SpaceWeights.of(system, numbers)
-        form = None if weights is None else weights.form(system)
-        root = None if form is None else settle(system, codes)
-        # the degree of a problem is +1
-        if weights is None or form is None or not isinstance(root, SpaceRoot) or root.index != 1:
-            return None
-        return root if form.serves(weights.distances(system, root.y, root.w), errors) else None
-
-
 def lone_root(
     system: EnclosedSpace, codes: Sequence[int], numbers: Floats, leaf: Sequence[int], errors: float = 1.0
 ) -> SpaceRoot | None:
@@ -169,12 +152,16 @@ def lone_root(
     if not is_complete(system, leaf) or not all(map(_allows, codes, leaf)):
         return None
     with np.errstate(all="ignore"):
-        root, weights = settle(system, leaf), SpaceWeights.of(system, numbers)
-        if weights is None or not isinstance(root, SpaceRoot):
-            return None
-        off = weights.distances(system, root.y, root.w)
-        forms = (weights.form(system, equations(system, codes, weight)) for weight in EQUATION_WEIGHTS)
-        return root if any(form is not None and form.serves(off, errors) for form in forms) else None
+        weights, root = SpaceWeights.of(system, numbers), None
+        for rows in equations_tried(system, codes) if weights is not None else ():
+            form = weights.form(system, rows)
+            root = settle(system, leaf) if form is not None and root is None else root
+            # the degree of a problem is +1
+            if form is None or not isinstance(root, SpaceRoot) or (rows is None and root.index != 1):
+                continue
+            if form.serves(weights.distances(system, root.y, root.w), errors):
+                return root
+    return None
 
 
 def _allows(code: int, final: int) -> bool:
@@ -203,6 +190,14 @@ def equations(system: EnclosedSpace, codes: Sequence[int], weight: float) -> Bal
     factor = weight / np.linalg.norm(system.S[held], axis=1, keepdims=True)
     rows = Ball(system.S[held], system.S_rad[held]) * Ball.exact(factor)
     return Ball.joined(rows, Ball.exact(weight * np.eye(len(system.g))[separate]))
+
+
+def equations_tried(system: EnclosedSpace, codes: Sequence[int]) -> Iterator[Ball | None]:
+    """Rows of ``equations``, with every weight that is tried; None where no status is assigned."""
+    if all(code == UNDECIDED for code in codes):
+        yield None
+    else:
+        yield from (equations(system, codes, weight) for weight in EQUATION_WEIGHTS)
 
 
 def is_complete(system: EnclosedSpace, codes: Sequence[int]) -> bool:
@@ -462,9 +457,10 @@ def only_on_curve(
         lost = np.where(off > 0, weights.kappa * off * ends[0].slip_sizes(S) + TINY, 0.0)
         if not np.all(np.isfinite(lost)):
             return False
-        assigned = any(code != UNDECIDED for code in codes)
-        held = [equations(system, codes, weight) for weight in EQUATION_WEIGHTS] if assigned else [None]
-        return any(all(UniqueForm.of(S, end, off, lost, rows) is not None for end in ends) for rows in held)
+        return any(
+            all(UniqueForm.of(S, end, off, lost, rows) is not None for end in ends)
+            for rows in equations_tried(system, codes)
+        )
 
 
 def _times(theta: Floats, discs: Ball) -> Ball:
