@@ -172,7 +172,7 @@ def places(vectors: Floats) -> Floats:
     return np.asarray(np.ldexp(quarter + s, DEEPEST))
 
 
-def holding(vector: Sequence[float], level: int) -> int:
+def holding(vector: Sequence[float] | Floats, level: int) -> int:
     """The sector of a level that holds the direction of a vector."""
     first = 1 << level
     return first + (int(places(np.asarray(vector, dtype=np.float64))) >> (DEEPEST + 2 - level)) % first

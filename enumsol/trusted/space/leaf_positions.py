@@ -55,7 +55,10 @@ def leaf_positions(problem: Any, alpha: Fraction, forces: Ball, codes: Sequence[
     # up to 1/2 arcsin is at most 1.05 times as large as its argument; otherwise any angle
     angle = np.where(wide < 0.5 * size, 1.1 * wide / np.where(size > 0, size, 1.0), _ANY)
     nodes = zip(codes, enclosed.tau.tolist(), tau.mid.tolist(), angle.tolist(), strict=True)
-    codes = [leaf_code(*node, max(2, min(_LEVEL, -ceil(log2(wide * _SHARE + 2.0**-_LEVEL))))) for *node, wide in nodes]
+    codes = [
+        leaf_code(code, places, force, max(2, min(_LEVEL, -ceil(log2(wide * _SHARE + 2.0**-_LEVEL)))))
+        for code, places, force, wide in nodes
+    ]
     along = np.isin(codes, (SLIP_PLUS, SLIP_MINUS))
     # along one axis the force's sign is known where its angle is
     if np.any(angle[along] >= _ANY):

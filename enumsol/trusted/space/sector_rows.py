@@ -10,7 +10,7 @@ from enumsol.model import sectors
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from enumsol.support.array_types import Indices
+    from enumsol.support.array_types import Floats, Indices
 
 
 OPEN, STICK, SLIP_PLUS, SLIP_MINUS, FRICTIONLESS, CONTACT, UNDECIDED = range(7)
@@ -62,7 +62,7 @@ def is_within(code: int, over: int) -> bool:
     return both and sectors.contains(over - sectors.SECTORS, code - sectors.SECTORS)
 
 
-def leaf_code(code: int, tau: Sequence[int], towards: Sequence[float], level: int) -> int:
+def leaf_code(code: int, tau: Sequence[int], towards: Sequence[float] | Floats, level: int) -> int:
     """The code of a node in a leaf, by its status: open, stick, and any other one for contact with slip.
 
     Parameters

@@ -153,7 +153,9 @@ def lone_root(
         return None
     with np.errstate(all="ignore"):
         weights, root = SpaceWeights.of(system, numbers), None
-        for rows in equations_tried(system, codes) if weights is not None else ():
+        if weights is None:
+            return None
+        for rows in equations_tried(system, codes):
             form = weights.form(system, rows)
             root = settle(system, leaf) if form is not None and root is None else root
             # the degree of a problem is +1
@@ -281,7 +283,7 @@ class SpaceWeights:
         return _gaps_serve(self, ones.mid, self.psi, ones, (-(w.mid[:p] + w.rad[:p]), slip))
 
     def distances(self, system: EnclosedSpace, y: Ball, w: Ball) -> Floats:
-        """How far each theta is at most from one that serves a solution in balls, (p,); infinite where that is open."""
+        """Upper bounds of distances of theta from one that serves a solution in balls, (p,); infinite where open."""
         p, has, unit = len(self.mu), system.tau >= 0, system.tau_units
         scale = system.slip_scale[:, None] / unit
         v, v_rad = system.tangential(w.mid) * scale, system.tangential(w.rad) * scale * SAFE + TINY
