@@ -485,7 +485,7 @@ def of_compliance(compute: Callable[[Any], _Value]) -> cached_property[_Value]:
     name = compute.__name__
 
     def value(system: EnclosedSystem) -> _Value:
-        found: _Value = compute(system) if system.same is None else getattr(system.same, name)
+        found: _Value = compute(system) if system.fixed is None else getattr(system.fixed, name)
         return found
 
     value.__doc__ = compute.__doc__
@@ -508,7 +508,7 @@ class EnclosedSystem:
     g, g_rad : (2p,) arrays
     F, F_rad : (p,) arrays
     rows : RigidRows, by default none
-    same : EnclosedSystem or None
+    fixed : EnclosedSystem or None
         One with the same S, from which comes what follows from that alone.
     tangents : int
         Tangential directions of a contact node: 1 in 2D, 2 in 3D.
@@ -523,7 +523,7 @@ class EnclosedSystem:
     F: Floats
     F_rad: Floats
     rows: RigidRows = field(kw_only=True, default=_NO_ROWS)
-    same: EnclosedSystem | None = field(kw_only=True, default=None, repr=False)
+    fixed: EnclosedSystem | None = field(kw_only=True, default=None, repr=False)
 
     def __post_init__(self) -> None:
         if self.rows is _NO_ROWS:

@@ -59,32 +59,28 @@ class FrictionUnits:
         return np.where(self.tau >= 0, values[self.tau], 0.0)
 
     @cached_property
-    def _units(self) -> Floats:
+    def tau_units(self) -> Floats:
         """Units of tau, shape (p, 2), 1 where it does not occur."""
         return np.where(self.tau >= 0, self.unit[self.tau], 1.0)
 
     @cached_property
     def disc_scale(self) -> Floats:
         """By what |tau| <= lambda_n is multiplied so that nothing in it is large, shape (p,)."""
-        return np.asarray(1.0 / np.maximum(np.max(self._units, axis=1), 1.0))
+        return np.asarray(1.0 / np.maximum(np.max(self.tau_units, axis=1), 1.0))
 
     @cached_property
     def slip_scale(self) -> Floats:
         """By what v is multiplied so that its larger component has the size of w_t, shape (p,)."""
-        return np.asarray(np.min(self._units, axis=1))
+        return np.asarray(np.min(self.tau_units, axis=1))
 
     @cached_property
     def tau_scale(self) -> Floats:
-        """By what entries of y are multiplied for ``taus``, shape (p, 2)."""
-        return self._units * self.disc_scale[:, None]
-
-    def taus(self, y: Floats) -> Floats:
-        """tau times ``disc_scale``, shape (p, 2)."""
-        return self.tangential(y) * self.tau_scale
+        """By what entries of y are multiplied to give tau times ``disc_scale``, shape (p, 2)."""
+        return self.tau_units * self.disc_scale[:, None]
 
     def slips(self, w: Floats) -> Floats:
         """v times ``slip_scale``, shape (p, 2)."""
-        return self.tangential(w) * (self.slip_scale[:, None] / self._units)
+        return self.tangential(w) * (self.slip_scale[:, None] / self.tau_units)
 
 
 def friction_units(F: Floats) -> Floats:
@@ -193,20 +189,24 @@ class PieceTurn:
     disc_turn: Ball
 
 
+#: Stands for the discs at one alpha, all of the radius one.
+_ONES = Ball.exact(np.ones(0))
+
+
 @dataclass(frozen=True)
 class EnclosedSpace(EnclosedSystem, FrictionUnits):
-    """A SpaceSystem as balls: S, g and F for the data as given, at one alpha or for all of a piece.
+    """A SpaceSystem as balls: S, g and F for the data as given, at one alpha or at all alpha of a piece.
 
-    Over a piece the variables do not depend on alpha: lambda_t is F tau with one F for the whole piece, so that S is
-    the same everywhere and |tau| is at most the radius of a disc times lambda_n. g, h and these radii are affine in
-    alpha; here they are the balls of the whole piece (theory, sections 12.9 and 14.14). In ``turn`` g is bordered by h.
+    Over a piece lambda_t is F tau with one F, so that S is the same everywhere and |tau| is at most the radius of a
+    disc times lambda_n. g, h and these radii are affine in alpha; here they are the balls of the whole piece (theory,
+    sections 12.9 and 14.14). In ``turn`` g is bordered by h.
 
     Attributes
     ----------
     tau, unit : arrays
         As in SpaceSystem.
-    disc : Ball of shape (p,), or None
-        Over a piece, or at a point of one: F(alpha) over F for all its alpha (see ``discs``).
+    discs : Ball of shape (p,)
+        Radii of the discs of tau over lambda_n, by default one; of an AlphaSpace F(alpha) over F.
     turn : PieceTurn or None
         Change of g and discs along a piece of alpha; None at one alpha.
     """
@@ -215,13 +215,39 @@ class EnclosedSpace(EnclosedSystem, FrictionUnits):
 
     tau: Indices
     unit: Floats
-    disc: Ball | None = field(kw_only=True, default=None)
+    discs: Ball = field(kw_only=True, default_factory=lambda: _ONES)
     turn: PieceTurn | None = field(kw_only=True, default=None)
 
-    @property
-    def discs(self) -> Ball:
-        """Radii of the discs of tau over lambda_n, shape (p,): one, but over a piece of alpha."""
-        return Ball.exact(np.ones(len(self.F))) if self.disc is None else self.disc
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        if self.discs is _ONES:
+            object.__setattr__(self, "discs", Ball.exact(np.ones(len(self.F))))
+
+    @cached_property
+    def inverse_friction(self) -> Ball:
+        """1 / F, shape (p, 2), 1 where F is 0: what takes an entry of w to the displacement of a row in its units."""
+        F = np.where(self.F > 0, self.F, 1.0)
+        return Ball(1.0 / F, (2.0 * self.F_rad / F + 2 * UNIT) / F * SAFE)
+
+    def forces_of(self, y: Ball, force: Floats) -> Ball:
+        """Forces (3p,), all normals first, of scaled ones y, with units of force (p,); 0 where there is no friction."""
+        return self._by_node(y, self.balls[2], force, 0.0)
+
+    def displacements_of(self, w: Ball, length: Floats) -> Ball:
+        """Displacements (3p,) of scaled ones w, with units of length (p,); unbounded where there is no friction."""
+        return self._by_node(w, self.inverse_friction, length, np.inf)
+
+    def _by_node(self, scaled: Ball, factors: Ball, unit: Floats, missing: float) -> Ball:
+        """All normal components, then both tangential ones times their factors; zeros stay exact."""
+        p, nodes = self.p, np.arange(self.p)
+        found = Ball(np.zeros(3 * p), np.full(3 * p, missing))
+        for k, at in enumerate([nodes, *self.tau.T]):
+            has = np.flatnonzero(at >= 0)
+            own = scaled[at[has]]
+            part = own * factors[has, k - 1] if k else own
+            rad = np.where((own.mid == 0) & (own.rad == 0), 0.0, part.rad * unit[has] + TINY)
+            found[k * p + has] = Ball(part.mid * unit[has], rad)
+        return found
 
     @property
     def end_discs(self) -> tuple[Ball, ...]:
@@ -230,19 +256,13 @@ class EnclosedSpace(EnclosedSystem, FrictionUnits):
         return (self.discs,) if turn is None else (turn.disc - turn.disc_turn, turn.disc + turn.disc_turn)
 
     @cached_property
-    def inverse_friction(self) -> Ball:
-        """1 / F, shape (p, 2), 1 where F is 0: what takes an entry of w to the displacement of a row in its units."""
-        F = np.where(self.F > 0, self.F, 1.0)
-        return Ball(1.0 / F, (2.0 * self.F_rad / F + 2 * UNIT) / F * SAFE)
-
-    @cached_property
     def largest_discs(self) -> Floats:
         """Upper bounds of ``discs``."""
         return np.where(self.discs.rad > 0, self.discs.size, self.discs.mid)
 
     @cached_property
     def references(self) -> Floats:
-        """F of the first component with friction, exact, (p,): lambda_t of it is F tau; 1 where there is none."""
+        """F of the first component with friction, (p,), as lambda_t is F tau; 1 where there is none."""
         found = np.ones(len(self.tau))
         for k in (1, 0):
             has = self.tau[:, k] >= 0
@@ -384,8 +404,8 @@ class AlphaSpace:
             turn = Ball(turn.mid, np.where(rigid.slope.size > 0, turn.rad, 0.0))
             along = replace(along, g=Ball.joined(along.g, rigid.h), g_turn=Ball.joined(along.g_turn, turn))
             rigid = replace(rigid, h=Ball(rigid.h.mid, (rigid.h.rad + turn.size) * SAFE))
-        disc = Ball(disc.mid, (disc.rad + disc_turn.size) * SAFE)
-        return replace(held, g=whole.mid, g_rad=whole.rad, disc=disc, turn=along, rows=rigid, same=held)
+        discs = Ball(disc.mid, (disc.rad + disc_turn.size) * SAFE)
+        return replace(held, g=whole.mid, g_rad=whole.rad, rows=rigid, discs=discs, turn=along, fixed=held)
 
     @cached_property
     def moved(self) -> Ball:

@@ -83,7 +83,7 @@ SHARED = {
     "trusted.space.sector_rows": None,
     "trusted.space.leaf_equations": {"with_free_bounds"},
     "trusted.space.leaves": None,
-    "trusted.space.force_bound": {"resultants", "unbounded"},
+    "trusted.space.force_bound": {"unbounded"},
     "trusted.space.turning": {"turned_by"},
     "trusted.space.boxed_solution": {
         *("Box", "BoxedSolution", "BoxProblem", "apart_in_boxes", "is_inside", "solution_in_box")
@@ -96,7 +96,7 @@ SHARED = {
     },
     "trusted.space.pieces": {"AlphaPiece", "LeafArc", "lie_along"},
     "trusted.space.space_uniqueness": {
-        *("LeafReference", "LooseSolution", "OnlySolution", "PieceWeights"),
+        *("LeafReference", "LooseSolution", "PieceWeights"),
         *("equations", "how_far_off", "moderate_units"),
     },
     "proof.begun": None,
