@@ -111,8 +111,8 @@ class PreciseSelection:
                 table = matrix([*C.tolist(), [arb(0)] * len(rows.unknown)])
                 parts.append((matrix(M.tolist()), column(b.tolist()), table, column([*c.tolist(), arb(unit)])))
         constant = not np.any(system.F1[[*rows.slip, *rows.stick]])
-        M, g, C, c = zip(*parts, strict=True)
-        return AlphaFunctions(M, g, C, c, constant)
+        matrices, loads, tables, values = zip(*parts, strict=True)
+        return AlphaFunctions(matrices, loads, tables, values, constant)
 
     def expansion(self, low: Number, high: Number) -> ShortExpansion | None:
         """The conditions over [low, high], also where the matrix may be singular; None where that is too long."""
