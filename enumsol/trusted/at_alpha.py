@@ -10,7 +10,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 from itertools import product
-from typing import TYPE_CHECKING, Any, Generic, NamedTuple, TypeVar
+from typing import TYPE_CHECKING, Generic, NamedTuple, TypeVar
 
 import numpy as np
 
@@ -27,7 +27,7 @@ from enumsol.arithmetic.balls import (
     upper_norm,
     verified_solve,
 )
-from enumsol.trusted.selection import Selection, row_values
+from enumsol.trusted.selection import Numbers, Selection, row_values
 from enumsol.trusted.status_rows import CONDITIONS, SLIP_MINUS, SLIP_PLUS, STICK
 
 if TYPE_CHECKING:
@@ -228,10 +228,11 @@ def _conditions(system: EnclosedSystem, codes: Sequence[int], force: Ball, w: Ba
     return VerifiedSelection(force[:contact], w[:contact], slack, sign, rigid)
 
 
-def conditions_of(codes: Sequence[int], force: Any, w: Any, F: Any) -> Any:
+def conditions_of(codes: Sequence[int], force: Numbers, w: Numbers, F: Numbers) -> Numbers:
     """Values of the inequalities of a complete selection, node by node, as balls or numbers of any kind."""
     kinds, nodes = np.array([(kind, i) for i, code in enumerate(codes) for kind in CONDITIONS[code][1]]).T
-    return row_values(force, w, F)[kinds, nodes]
+    values: Numbers = row_values(force, w, F)[kinds, nodes]
+    return values
 
 
 #: Nodes between stick and slip at most: there are twice as many selections for each.

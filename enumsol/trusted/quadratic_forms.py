@@ -16,12 +16,12 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from enumsol.arithmetic.balls import ROOT_TINY, SAFE, TINY, UNIT, Ball, gamma, least_eigenvalue, upper_norm
-from enumsol.trusted.selection import joined
+from enumsol.trusted.selection import Numbers, joined
 from enumsol.trusted.status_rows import CONTACT, OPEN, SLIP_MINUS, SLIP_PLUS, STICK, UNDECIDED
 
 if TYPE_CHECKING:
@@ -59,11 +59,12 @@ def equations_of(system: EnclosedSystem, codes: Sequence[int]) -> tuple[Ball, Ba
     return a, b
 
 
-def multiplied(rows: Any, F: Any, multipliers: Any) -> Any:
+def multiplied(rows: Numbers, F: Numbers, multipliers: Numbers) -> Numbers:
     """D' applied to a row for every component of w, (2p, k), with multipliers (4, p); all of them floats or balls."""
     p, (mu, nu, alpha, beta) = F.shape[0], (multipliers[k] for k in range(4))
     left, right, twice = joined(mu, nu), joined(F * (beta - alpha), alpha + beta), np.tile(np.arange(p), 2)
-    return rows[twice] * left[:, None] + rows[p + twice] * right[:, None]
+    found: Numbers = rows[twice] * left[:, None] + rows[p + twice] * right[:, None]
+    return found
 
 
 @dataclass(frozen=True, eq=False)

@@ -9,13 +9,16 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from functools import cached_property
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 
 from enumsol.arithmetic.balls import Ball
-from enumsol.support.array_types import Indices, Mask
+from enumsol.support.array_types import Indices, Mask, NDArray
 from enumsol.trusted.status_rows import OPEN, STICK
+
+#: Balls of double arithmetic, or arrays of floats or of exact numbers.
+Numbers = TypeVar("Numbers", Ball, NDArray[Any])
 
 NORMAL_FORCE, TANGENTIAL_FORCE, CONE_PLUS, CONE_MINUS, PENETRATION, SLIP_FORWARD, SLIP_BACKWARD = range(7)
 #: 1 for slip+, -1 for slip-, by status code.

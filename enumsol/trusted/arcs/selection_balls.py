@@ -4,27 +4,24 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import TYPE_CHECKING, Any, Generic, TypeVar
+from typing import TYPE_CHECKING, Any, Generic
 
 import numpy as np
 
 from enumsol.arithmetic.balls import SAFE, TINY, Ball, hull, solution
 from enumsol.condensation.enclosure import LEAST_PAIR, CondensedEnclosure, EnclosedSystem, NotEnclosedError, RigidRows
 from enumsol.trusted.floating_bounds import is_unbalanced, motion_against
-from enumsol.trusted.selection import Selection, joined, signed
+from enumsol.trusted.selection import Numbers, Selection, joined, signed
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from enumsol.model.problem import ContactProblem
-    from enumsol.support.array_types import Floats, NDArray
-
-
-_Numbers = TypeVar("_Numbers", Ball, "NDArray[Any]")
+    from enumsol.support.array_types import Floats
 
 
 @dataclass(frozen=True, eq=False)
-class ArcSystem(Generic[_Numbers]):
+class ArcSystem(Generic[Numbers]):
     """The condensed problem over alpha in balls: w = g0 + alpha g1 - S lambda.
 
     Balls are those of double arithmetic, in units given by powers of two, or arrays of arb with many digits, in the
@@ -40,9 +37,9 @@ class ArcSystem(Generic[_Numbers]):
         Bounds of q; none of a body that is held.
     """
 
-    S: _Numbers
-    g0: _Numbers
-    g1: _Numbers
+    S: Numbers
+    g0: Numbers
+    g1: Numbers
     F0: Floats
     F1: Floats
     reach: Floats = field(default_factory=lambda: np.zeros(0))
@@ -67,13 +64,13 @@ class ArcSystem(Generic[_Numbers]):
             rows = RigidRows.along(problem, force, length)
             return held.bordered(rows.G, rows.h, rows.slope, rows.reach)
 
-    def bordered(self, G: _Numbers, h: _Numbers, slope: _Numbers, reach: Floats) -> ArcSystem[_Numbers]:
+    def bordered(self, G: Numbers, h: Numbers, slope: Numbers, reach: Floats) -> ArcSystem[Numbers]:
         """System with the rows of the body as a whole, G lambda = h + alpha slope."""
         corner = self.exact(np.zeros((len(reach),) * 2))
         S = joined(joined(self.S.T, signed(G, -1)).T, joined(G.T, corner).T)
         return replace(self, S=S, g0=joined(self.g0, h), g1=joined(self.g1, slope), reach=reach)
 
-    def beside_zero(self, side: float) -> ArcSystem[_Numbers]:
+    def beside_zero(self, side: float) -> ArcSystem[Numbers]:
         """System for the constant load +-g1, for a side of 1 or -1 (see trusted.over_interval), or for 0 itself."""
         none = self.exact(np.zeros(self.g1.shape))
         return replace(self, g0=signed(self.g1, side), g1=none) if side else self
@@ -84,7 +81,7 @@ class ArcSystem(Generic[_Numbers]):
             return Ball.exact(values)
         return np.frompyfunc(type(self.S[0, 0]), 1, 1)(values)
 
-    def equations(self, rows: Selection) -> list[tuple[_Numbers, _Numbers, _Numbers, _Numbers]]:
+    def equations(self, rows: Selection) -> list[tuple[Numbers, Numbers, Numbers, Numbers]]:
         """M and g_R, C and c of a selection (see Selection.inequalities): at alpha = 0, and by how much they grow."""
         found, reach = [], self.exact(self.reach)
         zero: Any = 0.0 if isinstance(self.S, Ball) else type(self.S[0, 0])(0)
