@@ -19,7 +19,6 @@ if TYPE_CHECKING:
     from enumsol.decks.cards import DeckPlace
     from enumsol.decks.model import Deck, ElementBlock
     from enumsol.fem.meshes import PartedMesh
-    from enumsol.fem.scenes import Scene
     from enumsol.support.array_types import Floats, Integers, Mask, NDArray
 
 
@@ -162,22 +161,6 @@ class DeckParts:
         found = np.zeros(len(self._deck.points), dtype=bool)
         found[self.used] = True
         return found
-
-    def adjusted(self, scene: Scene) -> PartedMesh:
-        """Mesh whose contact nodes are moved onto what they face where the deck says so."""
-        points, rows = scene.mesh.points.copy(), scene.contacts.rows
-        adjusts = {(pair.slave, pair.master): pair.adjust for pair in self._deck.pairs}
-        for group, own in scene.contacts.by_group:
-            gaps, normals = scene.gaps[own], rows.normals[own]
-            adjust = None if group.pair is None else adjusts.get((group.pair.slave, group.pair.master))
-            if isinstance(adjust, str):
-                chosen = np.searchsorted(self.used, self.in_bodies(self._deck.node_sets[adjust]))
-                near = np.isin(rows.nodes[own], chosen) & (gaps != 0)
-            elif adjust is not None:
-                near = (gaps <= adjust) & (gaps != 0)
-            if adjust is not None:
-                points[rows.nodes[own][near]] += gaps[near, None] * normals[near]
-        return replace(scene.mesh, points=points)
 
 
 # -- deck meshes -------------------------------------------------------------------------------------------------------

@@ -200,7 +200,23 @@ class DeckModel:
         if all(pair.adjust is None for pair in self.deck.pairs):
             return mesh
         options = {**self._at_nodes(mesh, self._options[0]), **contacts(self.deck, 0)}
-        return self._parts.adjusted(mesh_scene(mesh, **options))
+        return self._adjusted(mesh_scene(mesh, **options))
+
+    def _adjusted(self, scene: Scene) -> PartedMesh:
+        """Mesh whose contact nodes are moved onto what they face where the deck says so."""
+        points, rows = scene.mesh.points.copy(), scene.contacts.rows
+        adjusts = {(pair.slave, pair.master): pair.adjust for pair in self.deck.pairs}
+        for group, own in scene.contacts.by_group:
+            gaps, normals = scene.gaps[own], rows.normals[own]
+            adjust = None if group.pair is None else adjusts.get((group.pair.slave, group.pair.master))
+            if isinstance(adjust, str):
+                chosen = np.searchsorted(self._parts.used, self._parts.in_bodies(self.deck.node_sets[adjust]))
+                near = np.isin(rows.nodes[own], chosen) & (gaps != 0)
+            elif adjust is not None:
+                near = (gaps <= adjust) & (gaps != 0)
+            if adjust is not None:
+                points[rows.nodes[own][near]] += gaps[near, None] * normals[near]
+        return replace(scene.mesh, points=points)
 
     def scene(self, step: int | None = None) -> Scene:
         """Scene at the end of a step (from 1), reached from no load at once; of a deck with one step, that one.
