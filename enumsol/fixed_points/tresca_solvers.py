@@ -14,7 +14,7 @@ from scipy.optimize import linprog
 from enumsol.errors import EnumsolError, MissingDependencyError
 from enumsol.fixed_points.system import ContactSystem, checked_problem, driven
 from enumsol.support.array_types import Floats, Mask
-from enumsol.support.deadlines import conic_answer
+from enumsol.support.conic import conic_answer
 
 if TYPE_CHECKING:
     from enumsol.fixed_points.system import Problem

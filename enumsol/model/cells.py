@@ -11,7 +11,6 @@ from functools import cached_property
 
 import numpy as np
 
-from enumsol.decks.elements import EDGES
 from enumsol.errors import InvalidArgumentError
 from enumsol.support.array_types import Floats, Integers
 
@@ -130,6 +129,15 @@ _SIDES_18 = np.array(
         [2, 0, 3, 5, 8, 12, 11, 14, 17],
     ]
 )
+#: Edges of cells by pairs of corners, in the order of the nodes between them; by the form of a cell.
+EDGES = {
+    "line": [[0, 1]],
+    "triangle": [[0, 1], [1, 2], [2, 0]],
+    "quadrilateral": [[0, 1], [1, 2], [2, 3], [3, 0]],
+    "tetrahedron": [[0, 1], [1, 2], [2, 0], [0, 3], [1, 3], [2, 3]],
+    "wedge": [[0, 1], [1, 2], [2, 0], [3, 4], [4, 5], [5, 3], [0, 3], [1, 4], [2, 5]],
+    "hexahedron": [[0, 1], [1, 2], [2, 3], [3, 0], [4, 5], [5, 6], [6, 7], [7, 4], [0, 4], [1, 5], [2, 6], [3, 7]],
+}
 _EDGES_OF_QUADRILATERAL = np.array([[0, 1, 4], [1, 2, 5], [2, 3, 6], [3, 0, 7]])
 _TURNED_TETRAHEDRON = [0, 2, 1, 3, 6, 5, 4, 7, 9, 8]
 _TURNED_WEDGE = [0, 2, 1, 3, 5, 4, 8, 7, 6, 11, 10, 9, 12, 14, 13, 17, 16, 15]
@@ -139,7 +147,7 @@ _TURNED_HEXAHEDRON = [0, 3, 2, 1, 4, 7, 6, 5, 11, 10, 9, 8, 15, 14, 13, 12, 16, 
 def _second(corners: Floats, form: str, sides: Integers = _NONE, inside: bool = False) -> Floats:
     """Places of corners, of the middles of edges and of those sides that have nine nodes, and of the middle."""
     own = [side[:4] for side in sides if len(np.unique(side)) == 9]
-    middles = [corners[edge].mean(axis=0) for edge in [*map(list, EDGES[form]), *own]]
+    middles = [corners[edge].mean(axis=0) for edge in [*EDGES[form], *own]]
     return np.array([*corners, *middles, *([corners.mean(axis=0)] if inside else [])])
 
 
@@ -178,11 +186,11 @@ KINDS: dict[tuple[int, int], CellKind] = {
     ),
     (2, 8): CellKind(
         *("quadratic quadrilaterals with 8 nodes", "quad8", 4, "quadrilateral", _EDGES_OF_QUADRILATERAL),
-        *(_second(_SQUARE, "quad"), _products(2, 2)[:-1], 5),
+        *(_second(_SQUARE, "quadrilateral"), _products(2, 2)[:-1], 5),
     ),
     (2, 9): CellKind(
         *("quadratic quadrilaterals", "quad9", 4, "quadrilateral", _EDGES_OF_QUADRILATERAL),
-        *(_second(_SQUARE, "quad", inside=True), _products(2, 2), 5),
+        *(_second(_SQUARE, "quadrilateral", inside=True), _products(2, 2), 5),
     ),
     (3, 4): CellKind(
         *("tetrahedra", "tetra", 4, "tetrahedron", _TETRAHEDRON[:, :3], _SIMPLEX, _sums(3, 1), 0),
@@ -190,7 +198,7 @@ KINDS: dict[tuple[int, int], CellKind] = {
     ),
     (3, 10): CellKind(
         *("quadratic tetrahedra", "tetra10", 4, "tetrahedron", _TETRAHEDRON),
-        *(_second(_SIMPLEX, "tetra"), _sums(3, 2), 4),
+        *(_second(_SIMPLEX, "tetrahedron"), _sums(3, 2), 4),
         turned=_TURNED_TETRAHEDRON,
     ),
     (3, 6): CellKind(

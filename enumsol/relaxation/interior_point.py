@@ -11,7 +11,7 @@ from scipy.linalg import solve_triangular
 from enumsol.model.statuses import CONTACT, UNDECIDED
 from enumsol.relaxation.engine import PRUNE_MARGIN, Relaxation
 from enumsol.relaxation.imposed_rows import EQUALITY, row_terms
-from enumsol.support.deadlines import conic_answer
+from enumsol.support.conic import conic_answer
 
 if TYPE_CHECKING:
     from enumsol.condensation.condensed import ScaledSystem

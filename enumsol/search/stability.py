@@ -22,7 +22,8 @@ from enumsol.search.growing_motions import (
     serves,
     smallest_eigenvalue,
 )
-from enumsol.support.deadlines import conic_answer, look
+from enumsol.support.conic import conic_answer
+from enumsol.support.deadlines import look
 from enumsol.trusted.running_away import Growing, Motion, Motions, NoMotion
 
 if TYPE_CHECKING:

@@ -26,7 +26,8 @@ from enumsol.search.solvers import Solvers
 from enumsol.search.space.space_fathoming import DefiniteForm
 from enumsol.search.subintervals import IntervalSearch
 from enumsol.selections.rational_selections import ExactSelections
-from enumsol.support.deadlines import Deadline, TimeOverError, attended, conic_answer, current, look, over, within
+from enumsol.support.conic import conic_answer
+from enumsol.support.deadlines import Deadline, TimeOverError, attended, current, look, over, within
 
 
 @pytest.fixture
