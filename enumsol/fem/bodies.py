@@ -216,7 +216,7 @@ _INDEFINITE = 1e-9
 
 
 @dataclass(frozen=True)
-class Material:
+class BodyMaterial:
     """Moduli of all cells, or of each.
 
     Attributes
@@ -292,7 +292,7 @@ def nodes_on_axis(points: Floats) -> Integers:
     return np.flatnonzero(points[:, 0] <= SAME * float(np.max(np.abs(points))))
 
 
-def material_of(mesh: PartedMesh, options: Options) -> Material:
+def material_of(mesh: PartedMesh, options: Options) -> BodyMaterial:
     """Material of a body.
 
     Raises
@@ -324,7 +324,7 @@ def material_of(mesh: PartedMesh, options: Options) -> Material:
         np.array([known[constants][k] for constants in (each[:1] if one else each)]) for k in range(3)
     )
     plain = all(others) and not is_axisymmetric(mesh, options)
-    return Material(
+    return BodyMaterial(
         elasticity[0] if one else elasticity,
         (coefficients[0] if one else coefficients) if plain else None,
         np.broadcast_to(thermal, (len(each), thermal.shape[1])) if options.expansion is not None else None,
@@ -466,7 +466,7 @@ def temperature_of(mesh: PartedMesh, value: object, name: str) -> tuple[Floats, 
 
 
 def thermal_forces(
-    body: NodalBasis, mesh: PartedMesh, options: Options, material: Material, others: Floats, slope: str = ""
+    body: NodalBasis, mesh: PartedMesh, options: Options, material: BodyMaterial, others: Floats, slope: str = ""
 ) -> tuple[Floats, Floats | None]:
     """Nodal forces (N, d) of thermal strains and ``others``, and the stresses (M, s) of the body with no displacement.
 
