@@ -57,9 +57,8 @@ def write_graph_proof(
     writer = ProofWriter()
     writer.write(graph_header(problem, interval, data))
     selections, leaves = set(), 0
-    friction = [
-        max(pair) > 0 for pair in zip(*(exactly_at(end, *problem.affine_friction) for end in interval), strict=True)
-    ]
+    at_ends = (exactly_at(end, *problem.affine_friction) for end in interval)
+    friction = [max(pair) > 0 for pair in zip(*at_ends, strict=True)]
     # assignments that pieces left to their halves, of the next piece the last ones
     due: list[list[Codes]] = []
     for found in pieces:

@@ -166,7 +166,8 @@ class PieceNumbers:
         found = cls(mu, kappa, nu, balance, share, int(degree))
         if degree not in range(1, _MOST_DEGREE + 1):
             raise ValueError(f"the degree of theta is not among 1 to {_MOST_DEGREE}")
-        if not (np.all(found.mu > 0) and np.all(found.kappa > 0) and balance >= 0):
+        finite = np.all(np.isfinite(numbers)) and np.all(np.isfinite(more))
+        if not (finite and np.all(found.mu > 0) and np.all(found.kappa > 0) and balance >= 0):
             raise ValueError("a number mu or kappa is not positive, or the factor of the balance negative")
         return found
 

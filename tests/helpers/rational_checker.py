@@ -9,7 +9,6 @@ import zlib
 from functools import lru_cache
 from itertools import pairwise, product
 from math import isfinite
-from types import SimpleNamespace
 
 from flint import fmpq, fmpq_mat
 from rational_arcs import Arcs
@@ -371,6 +370,14 @@ class FloatingPoint(Point):
         self.references.declare(selection, weights, *more)
 
 
+class Piece:
+    """[7.1] A piece, its units, forms at both ends, what was declared over it, and what it leaves to its halves."""
+
+    def __init__(self, ends, units, forms):
+        self.ends, self.units, self.forms = ends, units, forms
+        self.declared, self.cut = [], []
+
+
 class Graph(Proof):
     """[7]"""
 
@@ -426,7 +433,7 @@ class Graph(Proof):
         if self.origin in (x, y):
             loads = [[value if x == self.origin else -value for value in self.data.g1]]
         forms = self.forms_of((x, y), loads, [max(pair) for pair in ends], [min(pair) for pair in ends])
-        return SimpleNamespace(ends=(x, y), units=units, forms=forms, declared=[], cut=[])
+        return Piece((x, y), units, forms)
 
     def tree(self, over, root, records, position):
         """[5.2] Check the tree of a root; the place after it."""
