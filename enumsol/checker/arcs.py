@@ -81,7 +81,7 @@ class ClaimedArc:
 
 
 @dataclass(eq=False)
-class ArcLeaves:
+class PieceOnArcs:
     """Leaves over a piece that say that its solutions lie on the arcs through it, by one form.
 
     Attributes
@@ -183,7 +183,7 @@ class ArcChecker:
         The alpha at which g vanishes, if it lies in the interval.
     pieces : mapping of codes to lists of (Fraction, Fraction)
         Where selections survive.
-    closed : sequence of ArcLeaves
+    closed : sequence of PieceOnArcs
         Pieces whose solutions are said to lie on the arcs through them.
     fail : called with a sentence for every failure
     traces : int
@@ -198,7 +198,7 @@ class ArcChecker:
     interval: tuple[Fraction, Fraction]
     origin: Fraction | None
     pieces: Mapping[Codes, list[tuple[Fraction, Fraction]]]
-    closed: Sequence[ArcLeaves]
+    closed: Sequence[PieceOnArcs]
     fail: Callable[[str], None]
     traces: int = 0
     arcs: list[ClaimedArc] = field(default_factory=list)

@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from enumsol.checker.arcs import ArcChecker, ArcLeaves
+from enumsol.checker.arcs import ArcChecker, PieceOnArcs
 from enumsol.checker.reports import GraphVerificationReport
 from enumsol.checker.walk import TreeCell, TreeWalker
 from enumsol.condensation.enclosure import CondensedEnclosure
@@ -65,8 +65,8 @@ class GraphChecker(TreeWalker[EnclosedPiece]):
     _handed: dict[Codes, list[tuple[Fraction, Fraction]]] = field(default_factory=dict)
     _uncounted: int = 0
     #: Pieces whose solutions are said to lie on arcs, by the places of their forms those of this piece; and the arcs.
-    _closed: list[ArcLeaves] = field(default_factory=list)
-    _on_arcs: dict[int, ArcLeaves] = field(default_factory=dict)
+    _closed: list[PieceOnArcs] = field(default_factory=list)
+    _on_arcs: dict[int, PieceOnArcs] = field(default_factory=dict)
     _arcs: ArcChecker | None = None
     #: The piece and its units; its data, made when there is something to exclude; what it leaves to its halves.
     _ends: tuple[Fraction, Fraction] = field(init=False)
@@ -195,7 +195,7 @@ class GraphChecker(TreeWalker[EnclosedPiece]):
                 numbers = PieceNumbers.of(said.numbers, said.more)
             except ValueError as error:
                 raise reading.RefusedError(f"a form cannot be read: {error}") from None
-            self._on_arcs[len(self.declared) - 1] = ArcLeaves(*self._ends, numbers)
+            self._on_arcs[len(self.declared) - 1] = PieceOnArcs(*self._ends, numbers)
             for codes in said.codes:
                 self._handed.setdefault(codes, []).append(self._ends)
 
