@@ -98,9 +98,9 @@ def arc_count(records):
 
 def assignments(records):
     """Codes of the leaves over pieces by their places, as far as the records of a graph in 2D make sense."""
-    whole = (6,) * records[0]["p"]
     found, due, waiting, cut = {}, [], [], []
     try:
+        whole = (6,) * records[0]["p"]
         for k, record in enumerate(records[1:], start=1):
             if isinstance(record, dict):
                 if "piece" not in record:

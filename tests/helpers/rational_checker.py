@@ -390,7 +390,7 @@ class Graph(Proof):
         self.friction = [max(pair) > 0 for pair in zip(*F, strict=True)]
         self.origin = self.starts()
         self.pieces = self.leaves = 0
-        #: Codes of the surviving selections, with the pieces in which they survive.
+        #: Codes of the surviving selections, with the pieces in which they survive, each once.
         self.handed_on, self.closed = {}, []
 
     def run(self, records):
@@ -461,7 +461,7 @@ class Graph(Proof):
                 chosen = tuple(map(integer, selection))
                 pairs = zip(chosen, self.friction, strict=True)
                 need(all(refinements(code, rubs) == (code,) for code, rubs in pairs), "a selection is not complete")
-                self.handed_on.setdefault(chosen, []).append(over.ends)
+                self.handed_on.setdefault(chosen, {})[over.ends] = None
             need(len(numbers) == 3 * self.p, "a form of arcs has other numbers")
             lists = [numbers[k * self.p : (k + 1) * self.p] for k in range(3)]
             over.declared.append(self.arcs_of(over, lists, more))
@@ -496,7 +496,7 @@ class Graph(Proof):
         elif kind == "s":
             need(not rest, "a leaf says more")
             need(max(codes) < 5, "a surviving selection is not complete")
-            self.handed_on.setdefault(codes, []).append(over.ends)
+            self.handed_on.setdefault(codes, {})[over.ends] = None
         else:
             self.beside_arcs(over, codes, kind, *rest)
 
