@@ -31,6 +31,7 @@ from enumsol.trusted.status_rows import FRICTIONLESS, OPEN, SLIP_MINUS, SLIP_PLU
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Mapping, Sequence
 
+    from enumsol.arithmetic.balls import Ball
     from enumsol.condensation.enclosure import CondensedEnclosure
     from enumsol.model.problem import ContactProblem
     from enumsol.support.array_types import Codes
@@ -100,7 +101,9 @@ class PieceOnArcs:
     leaves: list[tuple[Codes, OnlyReference | Unbalanced]] = field(default_factory=list)
     bounded: bool = False
 
-    def failure(self, arcs: Sequence[ClaimedArc], systems: dict[int, ArcSystem], origin: Fraction | None) -> str | None:
+    def failure(
+        self, arcs: Sequence[ClaimedArc], systems: dict[int, ArcSystem[Ball]], origin: Fraction | None
+    ) -> str | None:
         """Why the arcs are not shown to hold all its solutions, or None. Events have their partners."""
         side = 0 if origin is None else 1 if self.b > origin else -1
         chain = self._chain([arc for arc in arcs if arc.side == side])
@@ -115,7 +118,7 @@ class PieceOnArcs:
         proven = all(only_roots(spans, self.numbers)) if not len(system.reach) else self._covered(spans, system)
         return None if proven else "its arcs are not proven to hold all its solutions"
 
-    def _covered(self, spans: Sequence[tuple[ArcSelection, float, float]], system: ArcSystem) -> bool:
+    def _covered(self, spans: Sequence[tuple[ArcSelection, float, float]], system: ArcSystem[Ball]) -> bool:
         """True if every leaf is proven to hold nothing beside the arcs (theory, section 14.16)."""
         ends = _below(self.a), -_below(-self.b)
         known, free = branch_references(spans, self.numbers), without_bound(system.at(*ends)).reach
@@ -204,7 +207,7 @@ class ArcChecker:
     arcs: list[ClaimedArc] = field(default_factory=list)
     events: list[ClaimedEvent] = field(default_factory=list)
     open: int = 0
-    _systems: dict[int, ArcSystem] = field(default_factory=dict)
+    _systems: dict[int, ArcSystem[Ball]] = field(default_factory=dict)
     #: Sums of the indices of arcs that begin there.
     _degrees: dict[str, int] = field(default_factory=lambda: {"first": 0})
 
@@ -222,8 +225,8 @@ class ArcChecker:
         except ValueError as error:
             raise RefusedError(f"the arcs cannot be read: {error}") from None
         sides = (0,) if self.origin is None else (-1, 1)
-        given = self.problem, self.enclosure
-        self._systems = {side: ArcSystem.of(*given, *units, float(side)) for side in sides}
+        system = ArcSystem.of(self.problem, self.enclosure, *units)
+        self._systems = {side: system.beside_zero(float(side)) for side in sides}
         record, due = next(records, _END), len(self._due)
         while isinstance(record, list):
             tell("selections followed", min(self.traces, due), due)
@@ -329,12 +332,14 @@ class ArcChecker:
     @cached_property
     def precise_system(self) -> Any:
         """The problem in many digits."""
-        from enumsol.trusted.arcs.many_digits import affordable
-        from enumsol.trusted.arcs.precise import PreciseSystem  # python-flint, not for all proofs
+        from enumsol.trusted.arcs.precise import (
+            affordable,
+            system_in_many_digits,  # python-flint, not for all proofs
+        )
 
         if not affordable(self.problem):
             raise ValueError("a box in many digits belongs to a problem that is too large for it")
-        system = PreciseSystem.of(self.problem)
+        system = system_in_many_digits(self.problem)
         if system is None:
             raise ValueError("A is positive definite only within rounding")
         return system
