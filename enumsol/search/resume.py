@@ -177,6 +177,6 @@ class Replay:
             return False
         if isinstance(leaf, leaves.OnlyReference):
             return search.closed(item, None, again=True)
-        if isinstance(leaf, records.ClosingRecord):
+        if leaf.closing:
             return search.closed(item, search.relaxations.energy(item.codes), again=True)
-        return isinstance(leaf, leaves.Solved) and search.settled(item)
+        return leaf.final and search.settled(item)
