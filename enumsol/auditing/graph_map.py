@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any, cast
 
 import numpy as np
 
-from enumsol.continuation.start import ALPHA_FRACTION, equation_on
+from enumsol.continuation.newton import ALPHA_FRACTION, equation_on
 from enumsol.continuation.transitions import selection_distance
 from enumsol.errors import InvalidArgumentError
 from enumsol.model.contact_body import ContactBody

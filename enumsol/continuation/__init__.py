@@ -3,8 +3,7 @@
 from enumsol.continuation.newton import NewtonIteration, NotConverged, newton
 from enumsol.continuation.parameter_path import SmoothPath
 from enumsol.continuation.path import AmbiguousStart, Path, follow, start_tangents
-from enumsol.continuation.path_data import ContinuationOptions, PathPoint, PathStats, Transition
-from enumsol.continuation.tangents import Tangent
+from enumsol.continuation.path_data import ContinuationOptions, PathPoint, PathStats, Tangent, Transition
 from enumsol.roots.local_branch import LocalBranchTest, local_branch_test
 
 __all__ = [

@@ -8,19 +8,21 @@ from typing import TYPE_CHECKING, Generic, TypeVar
 
 import numpy as np
 
-from enumsol.continuation.path_data import PathData, PathStatus, PointKind
+from enumsol.continuation.path_data import PathData, PathStatus, PointKind, Tangent
 from enumsol.continuation.recorder import SAME_POINT, Landmarks, PathRecorder, points_of
 from enumsol.continuation.scaled_equation import STATUS_TOLERANCE
-from enumsol.continuation.tangents import RATE_TOLERANCE, Tangent, curve_tangent, orientation
 from enumsol.continuation.transitions import (
     FORWARD_TOLERANCE,
+    RATE_TOLERANCE,
     Correction,
     Kink,
     TangentPoint,
     confirm,
     continuations,
+    curve_tangent,
     moore_penrose,
     next_kink,
+    orientation,
     passed_kink,
     same_curve,
     smooth_newton,
@@ -34,7 +36,7 @@ from enumsol.support.messages import counted
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from enumsol.continuation.start import Start
+    from enumsol.continuation.newton import Start
     from enumsol.support.array_types import Floats
     from enumsol.support.deadlines import Ending
 

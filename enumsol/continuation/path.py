@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any, Protocol
 import numpy as np
 
 from enumsol.continuation.follower import Follower
+from enumsol.continuation.newton import Start
 from enumsol.continuation.path_data import (
     ARRAYS,
     RIGID,
@@ -16,11 +17,10 @@ from enumsol.continuation.path_data import (
     PathStats,
     PathStatus,
     PointKind,
+    Tangent,
     Transition,
 )
-from enumsol.continuation.start import Start
-from enumsol.continuation.tangents import Tangent, admissible_tangents, curve_tangent
-from enumsol.continuation.transitions import ACTIVE_TOLERANCE, TangentPoint
+from enumsol.continuation.transitions import ACTIVE_TOLERANCE, TangentPoint, admissible_tangents, curve_tangent
 from enumsol.errors import InvalidArgumentError
 from enumsol.model.statuses import ContactStatus
 from enumsol.roots.local_branch import LocalBranchTest

@@ -14,15 +14,13 @@ import numpy as np
 from enumsol.condensation.condensed import condensation_of
 from enumsol.errors import OutputError
 from enumsol.model.statuses import STATUSES, ContactStatus
-from enumsol.proof.begun import BegunProof, begun_proof
-from enumsol.proof.writer import ProofWriter
+from enumsol.proof.writer import BegunProof, ProofWriter, begun_proof
 from enumsol.roots.root import Enclosure, Root
 from enumsol.roots.root_set import RigidBound, RootSet, SearchStats, Undecided
 from enumsol.search.certifiers.protocol import UndecidedPart
 from enumsol.search.outcome import AWAY, HOLD, SearchLimits, SearchOutcome, SearchProgress, Stop, StopReason
-from enumsol.search.parallel import SpreadSearch
 from enumsol.search.resume import resume
-from enumsol.search.setup import SearchSetup
+from enumsol.search.setup import SearchSetup, SpreadSearch
 from enumsol.support.deadlines import Deadline, within
 
 if TYPE_CHECKING:
@@ -120,8 +118,9 @@ class Enumeration(ABC, Generic[_Solvers]):
         self.tree = search = solvers.search(self.certifier, limits, self.progress)
         earlier = () if self._begun is None or self.writer is None else (self._begun, self.writer.replace)
         self.outcome = search.outcome
-        search.at_limit = solvers.at_limit
-        search.rest.otherwise = AWAY if search.at_limit is not None else "" if self.problem.held else HOLD
+        limit = solvers.at_limit
+        search.at_limit = None if limit is None else limit.nodes
+        search.rest.otherwise = AWAY if limit is not None else "" if self.problem.held else HOLD
         search.rest.continua = self._continua
         if solvers.unloaded():
             self.certifier.unloaded()

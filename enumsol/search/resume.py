@@ -12,15 +12,15 @@ from typing import TYPE_CHECKING, Any
 
 from enumsol.proof import leaves, records
 from enumsol.search.certifiers.protocol import NO_BOUND, RecordedBound
-from enumsol.search.fathoming_in_contact import LoneProposal
 from enumsol.search.nodes import TreeNode
+from enumsol.search.reduction import LoneProposal
 from enumsol.search.tree import TreeSearch
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
     from enumsol.condensation.enclosure import EnclosedSystem
-    from enumsol.proof.begun import BegunProof
+    from enumsol.proof.writer import BegunProof
     from enumsol.search.certifiers.protocol import Bound
     from enumsol.support.array_types import Codes
 

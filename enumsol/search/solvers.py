@@ -23,10 +23,9 @@ from enumsol.relaxation.interior_point import InteriorPointEngine
 from enumsol.search.certifiers.exclusions import Exclusions
 from enumsol.search.certifiers.float_certifier import FastCertifier
 from enumsol.search.certifiers.verified import VerifiedCertifier
-from enumsol.search.closing import TreeCloser
 from enumsol.search.fathoming import Closer, propose
 from enumsol.search.form_policy import Forms, plane_forms
-from enumsol.search.nodes import Relaxations
+from enumsol.search.nodes import Relaxations, TreeCloser
 from enumsol.search.reduction import WeightSource
 from enumsol.search.reference_closer import LeadingCloser
 from enumsol.search.resume import Reader

@@ -42,10 +42,9 @@ import enumsol
 from enumsol import ContactProblem, Interrupted, InvalidArgumentError, Proof, enumerate_roots, gallery, verify
 from enumsol.condensation.data import EXACT_DOF_LIMIT
 from enumsol.condensation.enclosure import NotEnclosedError
-from enumsol.proof.begun import BegunProof
 from enumsol.proof.leaves import leaves_of
 from enumsol.proof.records import Tree
-from enumsol.proof.writer import BESIDE, FLUSH_EVERY
+from enumsol.proof.writer import BESIDE, FLUSH_EVERY, BegunProof
 from enumsol.search import form_policy as policy
 from enumsol.search.resume import Replay
 

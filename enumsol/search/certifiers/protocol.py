@@ -23,8 +23,7 @@ if TYPE_CHECKING:
     from enumsol.condensation.enclosure import EnclosedSystem
     from enumsol.proof.records import DeclaredForm
     from enumsol.proof.writer import Part, Recorder
-    from enumsol.search.fathoming_in_contact import LoneProposal
-    from enumsol.search.reduction import Point, Proposal
+    from enumsol.search.reduction import LoneProposal, Point, Proposal
     from enumsol.support.array_types import Codes, Floats, Indices
     from enumsol.trusted.quadratic_forms import EnclosedForm
 

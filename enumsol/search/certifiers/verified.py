@@ -33,8 +33,7 @@ if TYPE_CHECKING:
     from enumsol.proof.writer import Recorder
     from enumsol.search.certifiers.exclusions import Exclusions
     from enumsol.search.certifiers.rational_certifier import ExactCertifier
-    from enumsol.search.fathoming_in_contact import LoneProposal
-    from enumsol.search.reduction import Point, Proposal
+    from enumsol.search.reduction import LoneProposal, Point, Proposal
     from enumsol.search.reference_closer import OnlyRoot
     from enumsol.support.array_types import Codes, Floats, Indices
     from enumsol.trusted.quadratic_forms import EnclosedForm

@@ -14,7 +14,7 @@ import scipy.linalg
 
 from enumsol.model.sectors import SECTORS, nearest, start_of
 from enumsol.model.statuses import CONTACT, FRICTIONLESS, OPEN, SLIP_MINUS, SLIP_PLUS, STICK, UNDECIDED
-from enumsol.search.closing import TreeCloser
+from enumsol.search.nodes import TreeCloser
 from enumsol.search.space.space_newton import Isotropic
 from enumsol.support.deadlines import look
 from enumsol.trusted.space.space_uniqueness import equations, moderate_units
