@@ -2,7 +2,7 @@
 
 from enumsol.auditing.audit_report import AuditedPoint, AuditReport, Jump, MissedArc
 from enumsol.auditing.auditor import FollowAllResult, audit, follow_all, follow_arc
-from enumsol.auditing.points import PointRun, read_points
+from enumsol.auditing.graph_map import PointRun, read_points
 from enumsol.auditing.results import ResultComparison, compare_result
 
 __all__ = [

@@ -14,8 +14,15 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from enumsol.auditing.audit_report import AuditedPoint, AuditReport, Jump, MissedArc, Verdict
-from enumsol.auditing.graph_map import GraphMap, GraphPlace, GraphPlaceKind, checked_graph
-from enumsol.auditing.points import Columns, PointRun, read_points
+from enumsol.auditing.graph_map import (
+    Columns,
+    GraphMap,
+    GraphPlace,
+    GraphPlaceKind,
+    PointRun,
+    checked_graph,
+    read_points,
+)
 from enumsol.continuation.path import AmbiguousStart, Path, follow, start_tangents
 from enumsol.continuation.path_data import PathStats, PathStatus
 from enumsol.errors import InvalidArgumentError, TooLargeError

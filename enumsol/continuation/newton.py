@@ -10,8 +10,8 @@ import numpy as np
 
 from enumsol.condensation.condensed import condensation_of, solved
 from enumsol.continuation.condensed_equation import CondensedEquation, DiscEquation
-from enumsol.continuation.parameter_path import ParameterPath, SmoothPath
 from enumsol.continuation.path_data import ContinuationOptions, PathData
+from enumsol.continuation.scaled_equation import ParameterPath, SmoothPath
 from enumsol.errors import EnumsolError, InvalidArgumentError
 from enumsol.model.problem import ContactProblem, check_is_problem
 from enumsol.model.statuses import OPEN, SLIP, STICK

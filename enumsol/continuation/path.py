@@ -33,7 +33,7 @@ if TYPE_CHECKING:
     import os
     from collections.abc import Callable, Sequence
 
-    from enumsol.continuation.parameter_path import SmoothPath
+    from enumsol.continuation.scaled_equation import SmoothPath
     from enumsol.model.problem3d import AnyProblem
     from enumsol.support.array_types import AlphaLike
 

@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 
     import pandas as pd
 
-    from enumsol.continuation.parameter_path import SmoothPath
+    from enumsol.continuation.scaled_equation import SmoothPath
     from enumsol.model.problem3d import AnyProblem
     from enumsol.model.statuses import ContactStatus
     from enumsol.roots.local_branch import LocalBranchTest

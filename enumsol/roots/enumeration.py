@@ -19,8 +19,7 @@ from enumsol.roots.root import Enclosure, Root
 from enumsol.roots.root_set import RigidBound, RootSet, SearchStats, Undecided
 from enumsol.search.certifiers.protocol import UndecidedPart
 from enumsol.search.outcome import AWAY, HOLD, SearchLimits, SearchOutcome, SearchProgress, Stop, StopReason
-from enumsol.search.resume import resume
-from enumsol.search.setup import SearchSetup, SpreadSearch
+from enumsol.search.setup import SearchSetup, SpreadSearch, resume
 from enumsol.support.deadlines import Deadline, within
 
 if TYPE_CHECKING:

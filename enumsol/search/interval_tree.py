@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 from enumsol.model.statuses import CONTACT, OPEN, UNDECIDED
 from enumsol.relaxation.active_set import ActiveSetEngine, IntervalSystem, PieceForm, interval_rows
-from enumsol.search.form_policy import PairedTerms, better_form
+from enumsol.search.nodes import PairedTerms, better_form
 from enumsol.search.splitting import ImposedRows, PlaneSplitting, branching_node
 from enumsol.support.deadlines import Deadline, TimeOverError, within
 

@@ -24,12 +24,10 @@ from enumsol.search.certifiers.exclusions import Exclusions
 from enumsol.search.certifiers.float_certifier import FastCertifier
 from enumsol.search.certifiers.verified import VerifiedCertifier
 from enumsol.search.fathoming import Closer, propose
-from enumsol.search.form_policy import Forms, plane_forms
-from enumsol.search.nodes import Relaxations, TreeCloser
+from enumsol.search.nodes import Forms, Relaxations, TreeCloser, plane_forms
 from enumsol.search.reduction import WeightSource
 from enumsol.search.reference_closer import LeadingCloser
-from enumsol.search.resume import Reader
-from enumsol.search.setup import WEAK, SearchSetup, weakly_held
+from enumsol.search.setup import WEAK, Reader, SearchSetup, weakly_held
 from enumsol.search.splitting import PlaneSplitting
 from enumsol.search.tree import TreeSearch
 from enumsol.selections.float_selections import FloatSelections

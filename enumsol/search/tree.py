@@ -29,7 +29,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
 
     from enumsol.relaxation.engine import Relaxation
-    from enumsol.search.form_policy import Forms
+    from enumsol.search.nodes import Forms
     from enumsol.search.parts import Answer
     from enumsol.search.reduction import LoneProposal
     from enumsol.search.splitting import Splitting

@@ -55,7 +55,7 @@ from contextlib import contextmanager
 from typing import TYPE_CHECKING
 
 import enumsol
-from enumsol.search import form_policy as policy
+from enumsol.search import nodes as policy
 from forms import neighbours_tree
 from shared.loads import DRAGGED, PRESSED, block, oblique_wedge, straight_wedge
 

@@ -33,7 +33,7 @@ from enumsol.checker.plane_checker import Checker
 from enumsol.checker.space_checker import SpaceChecker
 from enumsol.proof.leaves import leaves_of
 from enumsol.proof.records import Tree
-from enumsol.search import form_policy as forms
+from enumsol.search import nodes as forms
 
 POINTS = {
     "roots": lambda: (triangle(), 5.0),

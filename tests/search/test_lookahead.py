@@ -10,7 +10,7 @@ from generators import named, random_problem
 from proof_tools import bytes_of
 
 from enumsol import enumerate_roots
-from enumsol.search import form_policy, nodes, setup
+from enumsol.search import nodes, setup
 
 LOOKING = nodes.Lookahead._best
 
@@ -24,7 +24,7 @@ def soon(monkeypatch):
         chosen.append(LOOKING(self, codes, relaxation))
         return chosen[-1]
 
-    monkeypatch.setattr(form_policy, "NODES", 100)
+    monkeypatch.setattr(nodes, "FORM_AFTER", 100)
     monkeypatch.setattr(nodes, "NODES", 100)
     monkeypatch.setattr(nodes, "_DEPTHS", ((1.0, 6),))
     monkeypatch.setattr(nodes.Lookahead, "_best", counted)
@@ -32,7 +32,7 @@ def soon(monkeypatch):
 
 
 def test_random_problems_have_the_roots_of_all_selections(soon, monkeypatch):
-    monkeypatch.setattr(form_policy, "NODES", 0)
+    monkeypatch.setattr(nodes, "FORM_AFTER", 0)
     monkeypatch.setattr(nodes, "NODES", 0)
     rng, several, looked = np.random.default_rng(5), 0, 0
     for _ in range(40):

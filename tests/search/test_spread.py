@@ -11,7 +11,7 @@ from interruptions import CtrlC, interrupted
 from proof_tools import by_forms, bytes_of, records_of
 
 from enumsol import enumerate_roots, gallery, verify
-from enumsol.search import form_policy as policy, parts, setup
+from enumsol.search import nodes as policy, parts, setup
 from enumsol.support.workers import Crew
 
 
@@ -109,7 +109,7 @@ def test_one_proof(small_parts, wedge):
 @pytest.mark.few(0, 1)
 @pytest.mark.parametrize("nodes", [0, 100])
 def test_one_proof_with_forms(small_parts, tree_only, monkeypatch, nodes):
-    monkeypatch.setattr(policy, "NODES", nodes)
+    monkeypatch.setattr(policy, "FORM_AFTER", nodes)
     problem = gallery.clamped_block(32, 16)
     whole = enumerate_roots(problem, 0.3)
     found = check_one_proof(problem, 0.3, whole)

@@ -18,10 +18,8 @@ from enumsol.proof.writer import Recorder
 from enumsol.relaxation.convex_forms import SlipFormAscent
 from enumsol.relaxation.space_relaxation import SpaceEngine
 from enumsol.search.certifiers.protocol import Certifier, Unrecorded
-from enumsol.search.form_policy import Forms
-from enumsol.search.nodes import TreeCloser
-from enumsol.search.resume import Reader
-from enumsol.search.setup import WEAK, SearchSetup, weakly_held
+from enumsol.search.nodes import Forms, TreeCloser
+from enumsol.search.setup import WEAK, Reader, SearchSetup, weakly_held
 from enumsol.search.space.space_fathoming import SpaceCloser, SpaceClosing, solved
 from enumsol.search.space.space_search import SpaceCertifier, SpaceExclusions, SpaceSplitting
 
