@@ -81,10 +81,13 @@ class Relaxations:
 
     def of(self, item: TreeNode) -> Relaxation:
         """The relaxation of a node, from its parent's if that is there; solved or stalled."""
-        if item.parent is not None:
-            return item.parent.child(*self.rows.of(item.changed, item.codes[item.changed]), last=item.last)
-        relaxation = self._root(item.codes)
-        return self._by_steps(item.codes) if relaxation.stalled and item.changed >= 0 else relaxation
+        relaxation = self.below(item.parent, item.codes, (item.changed,), last=item.last)
+        alone = item.parent is None and item.changed >= 0
+        return self._by_steps(item.codes) if alone and relaxation.stalled else relaxation
+
+    def below(self, parent: Relaxation | None, codes: Codes, changed: Sequence[int], *, last: bool) -> Relaxation:
+        """The relaxation of a partial assignment, from its parent's if that is there, by the nodes that changed."""
+        return self._root(codes) if parent is None else parent.child(*self.rows.over(codes, changed), last=last)
 
     def energy(self, codes: Codes) -> Relaxation | None:
         """The relaxation of a partial assignment with the energy, if it is solved and leaves a minimiser."""

@@ -32,7 +32,6 @@ if TYPE_CHECKING:
     from enumsol.search.nodes import Forms
     from enumsol.search.parts import Answer
     from enumsol.search.reduction import LoneProposal
-    from enumsol.search.splitting import Splitting
     from enumsol.support.array_types import Codes
     from enumsol.support.deadlines import Limited
 
@@ -42,11 +41,7 @@ class Remainder:
 
     Parameters
     ----------
-    certifier : Certifier
-    splitting : Splitting
-    outcome : SearchOutcome
-    settle : callable
-        Has the certifier decide a complete selection.
+    search : TreeSearch
     known_root : callable, optional
         Gives the codes of a complete selection that is known to hold a root, or None.
 
@@ -59,16 +54,9 @@ class Remainder:
         Advice if limits are reached, besides raising them.
     """
 
-    def __init__(
-        self,
-        certifier: Certifier,
-        splitting: Splitting,
-        outcome: SearchOutcome,
-        settle: Callable[[Codes], object],
-        known_root: Callable[[], Codes | None] | None = None,
-    ) -> None:
-        self._certifier, self._splitting, self._outcome, self._settle = certifier, splitting, outcome, settle
-        self._recorder, self._known_root, self.otherwise = certifier.recorder, known_root, ""
+    def __init__(self, search: TreeSearch, known_root: Callable[[], Codes | None] | None = None) -> None:
+        self._search, self._certifier, self._outcome = search, search.certifier, search.outcome
+        self._recorder, self._known_root, self.otherwise = search.certifier.recorder, known_root, ""
         self.continua: Callable[[], Sequence[Codes]] = list
         #: Subtrees, and the records that follow each of them.
         self._left: list[tuple[Codes, KeptRecords]] = []
@@ -94,7 +82,7 @@ class Remainder:
         """Add the root that is known, in a search that was interrupted before it came there."""
         root = self.known()
         if root is not None and root not in self._certifier.certified.verified:
-            self._settle(root)
+            self._search.settled(TreeNode(None, root, -1, last=False, weight=0.0))
 
     def finish(self) -> None:
         """Leave undecided what was left, except for complete selections, which are decided if there is time."""
@@ -121,30 +109,27 @@ class Remainder:
         return wanted
 
     def _leave_but(self, codes: Codes, wanted: Sequence[Codes]) -> None:
-        stack = [(codes, wanted)]
+        splitting, stack = self._search.splitting, [(codes, wanted)]
         while stack:
             codes, wanted = stack.pop()
-            wanted = [final for final in wanted if all(map(self._splitting.holds, codes, final))]
+            wanted = [final for final in wanted if all(map(splitting.holds, codes, final))]
             if not wanted:
                 self._skip(codes)
                 continue
             node = next((i for i, code in enumerate(codes) if code != wanted[0][i]), -1)
             if node < 0:
-                self._decide(codes)
+                try:
+                    self._search.settled(TreeNode(None, codes, -1, last=False, weight=0.0))
+                except TimeOverError:
+                    self._outcome.late = True
+                    self._skip(codes)
                 continue
             final, before, after = wanted[0][node], codes[:node], codes[node + 1 :]
             # the one that holds the selection comes last: what is beside it is left behind at once
-            children = self._splitting.towards(codes, node, final)
-            children.sort(key=partial(self._splitting.holds, final=final))
+            children = splitting.towards(codes, node, final)
+            children.sort(key=partial(splitting.holds, final=final))
             self._certifier.branching(node, children)
             stack += [((*before, code, *after), wanted) for code in reversed(children)]
-
-    def _decide(self, codes: Codes) -> None:
-        try:
-            self._settle(codes)
-        except TimeOverError:
-            self._outcome.late = True
-            self._skip(codes)
 
     def _skip(self, codes: Codes) -> None:
         stop = self._outcome.stopped
@@ -204,7 +189,7 @@ class TreeSearch:
         self.closer.relaxed = relaxations.energy
         self._recorder = certifier.recorder
         self.outcome = SearchOutcome()
-        self.rest = Remainder(certifier, self.splitting, self.outcome, self._settle_late, known_root)
+        self.rest = Remainder(self, known_root)
         #: Most nodes where the load is at the limit of what contact can hold: what stays undecided, rounding decides.
         self.at_limit: int | None = None
         self.covered = 0.0
@@ -368,10 +353,6 @@ class TreeSearch:
         """Leave what was skipped undecided, except for the known root and the selections of continua in it."""
         with within(Deadline(self.limits.deadline).extended(self._start)):
             self.rest.finish()
-
-    def _settle_late(self, codes: Codes) -> None:
-        """Have the certifier decide a complete selection after the search was stopped."""
-        self._settle(TreeNode(None, codes, -1, last=False, weight=0.0))
 
     def examine(self, item: TreeNode) -> list[TreeNode]:
         """Settle one node of the tree, or give its children, the one that is examined first last."""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from functools import cache, partial
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -14,11 +15,9 @@ from enumsol.search.reduction import NEAR
 from enumsol.selections.solution import SelectionSolution, SelectionSolver, VertexLimitError
 
 if TYPE_CHECKING:
-    from enumsol.search.certifiers.protocol import Margin
     from enumsol.search.reduction import Point, Proposal
     from enumsol.selections.float_selections import FloatSelections
     from enumsol.support.array_types import Codes
-    from enumsol.trusted.quadratic_forms import EnclosedForm
 
 
 #: A condition is broken beyond doubt: one that is broken by less may hold within the tolerance at another point.
@@ -50,7 +49,7 @@ class FastCertifier(Certifier):
         self._selections = selections
         super().__init__()
         self._norms = selections.row_norms()
-        self._form_margins: dict[EnclosedForm, Margin] = {}
+        self._margin_of = cache(partial(margin_of_form, errors=1.0))
 
     def excluded(self, codes: Codes, relaxation: Bound) -> bool:
         """Accept the pruning if conditions may be off by twice the tolerance."""
@@ -58,10 +57,7 @@ class FastCertifier(Certifier):
         shift = float(np.abs(values) @ self._norms[rows])
         if relaxation.form is not None:
             # hardly convex: its bound is worth what is left of it after rounding
-            margin = self._form_margins.get(relaxation.form)
-            if margin is None:
-                margin = self._form_margins[relaxation.form] = margin_of_form(relaxation.form, 1.0)
-            return margin(codes, rows, values) > 2.0 * self._selections.tolerance * shift
+            return self._margin_of(relaxation.form)(codes, rows, values) > 2.0 * self._selections.tolerance * shift
         return relaxation.bound > PRUNE_MARGIN + 2.0 * self._selections.tolerance * shift
 
     def closed(self, codes: Codes, proposal: Proposal | None, near: Point) -> list[SelectionSolution] | None:

@@ -7,7 +7,7 @@ problem is small enough, otherwise the selection is left undecided with the reas
 from __future__ import annotations
 
 from dataclasses import replace
-from functools import partial
+from functools import cache, partial
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -89,7 +89,7 @@ class VerifiedCertifier(protocol.Certifier):
         self._exact = exact
         self._node_ids = node_ids
         self._escalations = protocol.Escalations()
-        self._form_margins: dict[EnclosedForm, protocol.Margin] = {}
+        self._margin_of = cache(partial(protocol.margin_of_form, errors=protocol.FORM_ERRORS))
         #: Selections of the roots found in rationals.
         self._known: list[Codes] = []
 
@@ -119,10 +119,7 @@ class VerifiedCertifier(protocol.Certifier):
 
     def _excluded_by(self, form: EnclosedForm, codes: Codes, rows: Indices, values: Floats) -> bool:
         """True if multipliers exclude the assignment with a form in place of the energy."""
-        margin = self._form_margins.get(form)
-        if margin is None:
-            margin = self._form_margins[form] = protocol.margin_of_form(form, protocol.FORM_ERRORS)
-        kept = proven(margin, codes, rows, values)
+        kept = proven(self._margin_of(form), codes, rows, values)
         if kept is None:
             self._escalations.refined += 1
             return False
