@@ -41,8 +41,6 @@ if TYPE_CHECKING:
 
 #: How the names of columns tell the contact nodes apart; "auto" takes the one for which all columns are there.
 Columns = Literal["auto", "rows", "labels"]
-_FORCES = ("lambda_n", "lambda_t")
-_FORCES_3D = ("lambda_n", "lambda_t1", "lambda_t2")
 #: Names of columns that an error lists.
 _LISTED = 12
 
@@ -137,7 +135,7 @@ def _from_path(number: int, path: Path, problem: AnyProblem) -> PointRun:
 
 def _forces(problem: AnyProblem) -> tuple[str, ...]:
     """Names of the forces of a contact node."""
-    return _FORCES if isinstance(problem, ContactProblem) else _FORCES_3D
+    return ("lambda_n", *(("lambda_t",) if isinstance(problem, ContactProblem) else ("lambda_t1", "lambda_t2")))
 
 
 def _check_nodes(found: int, p: int) -> None:

@@ -134,10 +134,6 @@ def _unpack(data: dict[str, Any]) -> Transition:
     )
 
 
-#: What a figure of a path may show.
-_QUANTITIES = ("lambda_n", "lambda_t", "u_n", "u_t")
-
-
 class Drawn(Protocol):
     """A branch graph, of which paths ask only for its figure."""
 
@@ -188,7 +184,7 @@ def draw_path(
     InvalidArgumentError
         An argument is not one of those above.
     """
-    one_of(quantity, "quantity", _QUANTITIES)
+    one_of(quantity, "quantity", ("lambda_n", "lambda_t", "u_n", "u_t"))
     node, named_units = row_number(node, "node", path.lambda_n.shape[1]), checked_units(units)
     if graph is not None and ax is not None:
         raise InvalidArgumentError("graph and ax are both given; draw further paths with path.plot(ax=...) alone")

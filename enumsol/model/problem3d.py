@@ -32,10 +32,6 @@ _EXPECTED = "expected a number, a pair (F1, F2) of numbers or (p,) arrays, a Fri
 _JUMP_SAMPLES, _JUMP_BISECTIONS, _JUMP_SHARE = 33, 40, 0.5
 
 
-#: How far from 1 weights of a mean may add up to.
-_SUM_TOLERANCE = 1e-9
-
-
 @dataclass(frozen=True)
 class ConstantFriction(Sealed):
     """Coefficients that do not depend on the solution, values of shape (p, 2)."""
@@ -281,7 +277,8 @@ class SlipMean(Immutable):
         if np.any(matrices["weights"].data < 0):
             raise InvalidProblemError("slip_mean has a negative weight; expected weights >= 0")
         sums = np.asarray(matrices["weights"].sum(axis=1)).ravel()
-        if np.any(np.abs(sums - 1.0) > _SUM_TOLERANCE):
+        # how far from 1 weights of a mean may add up to
+        if np.any(np.abs(sums - 1.0) > 1e-9):
             row = int(np.argmax(np.abs(sums - 1.0)))
             raise InvalidProblemError(f"slip_mean has weights that add up to {sums[row]:g} in row {row}; expected 1")
         self._freeze()

@@ -156,7 +156,9 @@ def _holding_at_vertices(solution: SelectionSolution, solver: SelectionSolver) -
     whole = True
     for vertex in solution.vertices:
         look()
-        active = _with_own(solver.active(vertex), solution.codes if solution.dimension == 0 else None)
+        active = solver.active(vertex)
+        if solution.dimension == 0:
+            active = tuple(held | {code} for held, code in zip(active, solution.codes, strict=True))
         if prod(len(a) for a in active) > MAX_LOCAL_SELECTIONS:
             whole = False
         else:
@@ -179,10 +181,6 @@ def _join(
                 rest.append((other, other_whole))
         merged = [*rest, (current, flag)]
     return merged
-
-
-def _with_own(active: ActiveSets, codes: Codes | None) -> ActiveSets:
-    return active if codes is None else tuple(a | {code} for a, code in zip(active, codes, strict=True))
 
 
 def _touch(a: SelectionSolution, b: SelectionSolution, solver: SelectionSolver) -> bool:
@@ -308,7 +306,6 @@ def closed_component(solution: SelectionSolution) -> RootComponent:
 #: Sizes of the perturbation of g relative to the load's energy norm (to one for an unloaded body), and of which two
 #: the roots must lie in the same selections: statuses that hold strictly must not be lost on the way.
 _STEPS, _DIRECTIONS = (1e-5, 1e-6), 2
-_MAX_NODES = 100_000
 
 
 def local_degree(solver: FloatSelections, active: ActiveSets, point: tuple[Floats, Floats] | None) -> int | None:
@@ -361,7 +358,7 @@ def _perturbed(solver: FloatSelections, active: ActiveSets, push: Floats) -> dic
     """Selections of the roots of a perturbed problem, with sign det; None where it is not found."""
     loaded = bool(np.any(solver.system.g))
     system = replace(solver.system, g=solver.system.g + push if loaded else push / _STEPS[-1])
-    splitting, limits = PlaneSplitting(system.F, active), SearchLimits(max_nodes=_MAX_NODES, deadline=current())
+    splitting, limits = PlaneSplitting(system.F, active), SearchLimits(max_nodes=100_000, deadline=current())
     certifier = FastCertifier(FloatSelections(system, solver.tolerance))
     outcome = plane_search(system, certifier, splitting, limits).run()
     if outcome.stopped is not None or any(not s.strict or s.det_sign == 0 for s in outcome.solutions):

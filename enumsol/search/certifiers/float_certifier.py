@@ -22,8 +22,6 @@ if TYPE_CHECKING:
 
 #: A condition is broken beyond doubt: one that is broken by less may hold within the tolerance at another point.
 _CLEARLY = 1e-6
-#: A point whose conditions hold within the tolerance is near the solution of a closed subtree: nearer than this.
-_NEARBY = 1e-3
 
 
 def solve_or_open(solver: SelectionSolver, codes: Codes) -> SelectionSolution | UndecidedPart | None:
@@ -65,7 +63,8 @@ class FastCertifier(Certifier):
         solver = self._selections
         if proposal is None or proposal.weights is None:
             return None
-        if 2.0 * solver.tolerance * proposal.reduction.sensitivity > _NEARBY:
+        # a point whose conditions hold within the tolerance is nearer than this to the solution of a closed subtree
+        if 2.0 * solver.tolerance * proposal.reduction.sensitivity > 1e-3:
             return None
         if proposal.least < -max(_CLEARLY, 2.0 * solver.tolerance):
             return []
