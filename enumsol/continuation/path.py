@@ -55,10 +55,10 @@ def save_path(followed: PathData, path: str | os.PathLike[str]) -> None:
         "next_step": followed.next_step,
         "stats": followed.stats.__dict__,
         "node_ids": followed.node_ids,
-        "names": [[status.value for status in point.statuses] for point in followed],
+        "names": followed._names,
     }
     if followed.rigid_coordinates is not None:
-        report[RIGID] = followed.rigid_coordinates.tolist()
+        report[RIGID] = followed.rigid_coordinates
     write_arrays(file_path(path, "path"), _FORMAT, report, {name: getattr(followed, name) for name in ARRAYS})
 
 
@@ -107,15 +107,12 @@ def _unpacked(report: dict[str, Any], arrays: dict[str, Any]) -> Path:
 
 def _pack(item: Transition) -> dict[str, Any]:
     test = item.local_test
-    packed = None
-    if test is not None:
-        signs = [[[s.value for s in statuses], sign] for statuses, sign in test.signs]
-        packed = {"exists": test.exists, "premise": test.premise, "signs": signs}
+    packed = None if test is None else {"exists": test.exists, "premise": test.premise, "signs": test.signs}
     return {
         "point": item.point,
         "alpha": item.alpha,
-        "before": [s.value for s in item.before],
-        "after": [s.value for s in item.after],
+        "before": item.before,
+        "after": item.after,
         "nodes": item.nodes,
         "dalpha": [item.dalpha_before, item.dalpha_after],
         "local_test": packed,

@@ -23,7 +23,7 @@ from enumsol.proof.proof_file import Proof
 from enumsol.roots.root import Enclosure, Polytope, Root, RootFamily, summary
 from enumsol.roots.root_set import RigidBound, RootSet, SearchStats, Undecided
 from enumsol.support.arguments import file_path, positive_integer, shown
-from enumsol.support.files import reading, write_file
+from enumsol.support.files import plain_value, reading, write_file
 from enumsol.support.immutable import Listed
 from enumsol.support.plotting import checked_units, kept
 from enumsol.support.saved import Array, Maybe, check_kind, is_fraction, is_number, json_from
@@ -61,7 +61,7 @@ def save_history(data: history_data.HistoryData, file: str | Path) -> None:
         "seconds": data.seconds,
         "refinement": None if data.refinement is None else asdict(data.refinement),
     }
-    write_file(file_path(file, "file"), json.dumps(record, default=_plain), "file")
+    write_file(file_path(file, "file"), json.dumps(record, default=plain_value), "file")
 
 
 def load_history(file: str | Path, problem: AnyProblem) -> History:
@@ -246,13 +246,6 @@ def _read_root(record: dict[str, Any], alpha: Alpha, problem: AnyProblem) -> Roo
 def _family(family: RootFamily) -> dict[str, Any]:
     parts = [[part.statuses, part.vertices, part.dimension, part.rigid_coordinates] for part in family.polytopes]
     return {"polytopes": parts, "index": family.index, "proven": family.vertices_proven}
-
-
-def _plain(value: object) -> Any:
-    """Lists of arrays, names of statuses and texts of fractions, which JSON has no values for."""
-    if isinstance(value, np.ndarray):
-        return value.tolist()
-    return value.value if isinstance(value, ContactStatus) else str(value)
 
 
 def _array(values: object) -> Any:
