@@ -100,34 +100,25 @@ class PiecewiseSmoothEquation:
         return np.sign(self.test_functions(x, alpha)).astype(np.int8)
 
     def residual(self, x: ArrayLike, alpha: AlphaLike) -> Floats:
-        """H(x, alpha), shape (n + 2p,), evaluated from the projections themselves."""
-        u, lambda_n, lambda_t = self.split(x)
-        problem, r = self.problem, self.r
-        bound = problem.friction_at(alpha) * lambda_n
-        trial = lambda_t + r * (problem.Bt @ u - problem.slip_offset)
+        """H(x, alpha), shape (n + 2p,)."""
         # P by its pieces: the sum min + max - trial would lose the bound's digits where r u_t is much larger
-        inside = np.clip(trial, -np.abs(bound), np.abs(bound))
-        projected = np.where(bound >= 0, inside, -inside)
-        return np.concatenate(
-            [
-                self._equilibrium(u, lambda_n, lambda_t, alpha),
-                lambda_n - np.maximum(0.0, lambda_n + r * (problem.Bn @ u - problem.gap)),
-                lambda_t - projected,
-            ]
-        )
+        return self._selected(self.test_functions(x, alpha) > 0, x, alpha)
 
     def selection_residual(self, signs: ArrayLike, x: ArrayLike, alpha: AlphaLike) -> Floats:
         """The selection function of H that ``signs`` (p, 3) names, at x; equals H where the test functions agree."""
+        return self._selected(self._rows(signs), x, alpha)
+
+    def _selected(self, rows: Mask, x: ArrayLike, alpha: AlphaLike) -> Floats:
         u, lambda_n, lambda_t = self.split(x)
         problem, r = self.problem, self.r
-        closed, slips, count = pieces(self._rows(signs))
+        closed, slips, count = pieces(rows)
         bound = problem.friction_at(alpha) * lambda_n
         u_n, u_t = problem.Bn @ u - problem.gap, problem.Bt @ u - problem.slip_offset
         return np.concatenate(
             [
-                self._equilibrium(u, lambda_n, lambda_t, alpha),
+                problem.A @ u + problem.Bn.T @ lambda_n + problem.Bt.T @ lambda_t - problem.load_at(alpha),
                 np.where(closed, -r * u_n, lambda_n),
-                lambda_t - slips * bound - count * (lambda_t + r * u_t),
+                (1 - count) * lambda_t - slips * bound - count * r * u_t,
             ]
         )
 
@@ -156,12 +147,6 @@ class PiecewiseSmoothEquation:
                 f"signs has shape {array.shape}; expected (p, 3) = ({self.problem.p}, 3) with entries -1 or 1"
             )
         return np.asarray(array > 0)
-
-    def _equilibrium(self, u: Floats, lambda_n: Floats, lambda_t: Floats, alpha: AlphaLike) -> Floats:
-        problem = self.problem
-        return np.asarray(
-            problem.A @ u + problem.Bn.T @ lambda_n + problem.Bt.T @ lambda_t - problem.load_at(alpha), dtype=np.float64
-        )
 
 
 def pieces(rows: Mask) -> tuple[Mask, Floats, Floats]:

@@ -6,9 +6,9 @@ import time
 from collections import Counter
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import closing
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from fractions import Fraction
-from functools import cached_property, partial
+from functools import cached_property
 from itertools import pairwise
 from textwrap import fill
 from typing import TYPE_CHECKING, Any
@@ -121,58 +121,39 @@ def multiplicity_map(
         options["without"] = without
     if "interval" in options or "progress" in options:
         raise InvalidArgumentError("interval and progress are not options here; expected those of branch_graph")
-    rows = _Rows(name, interval, values, make, options, arguments.optional_seconds(time_limit))
-    with workers_of(executor, jobs) as pool:
-        return keeping(
-            "multiplicity_map",
-            partial(rows.run, pool, progress),
-            lambda ending: rows.result(str(Stop(StopReason.of(ending)))),
-            lambda found: f" after {len(found.rows)} of {counted(len(values), 'value')}",
-        )
+    seconds, started = arguments.optional_seconds(time_limit), time.perf_counter()
+    done: dict[int, MapRow] = {}
 
-
-@dataclass
-class _Rows:
-    """The rows of a map while they are made."""
-
-    name: str
-    interval: tuple[Alpha, Alpha]
-    values: list[float]
-    make: Callable[[float], ContactProblem]
-    options: dict[str, Any]
-    seconds: float | None
-    started: float = field(default_factory=time.perf_counter)
-    done: dict[int, MapRow] = field(default_factory=dict)
-
-    def run(self, executor: Executor | None, progress: Callable[[int, int], object] | None) -> MultiplicityMap:
-        """The map of all rows, while there is time."""
-        with closing(spread(executor, self._row_calls())) as found:
-            for place, row in found:
-                self.done[place] = row
-                if progress is not None:
-                    progress(len(self.done), len(self.values))
-        return self.result()
-
-    def _row_calls(self) -> Iterator[Call[int]]:
+    def calls() -> Iterator[Call[int]]:
         """Calls of map_row, while there is time; the options have what is left of it."""
-        for place, value in enumerate(self.values):
-            if (left := self._left()) == 0:
+        for place, value in enumerate(values):
+            left = None if seconds is None else seconds - (time.perf_counter() - started)
+            if left is not None and left <= 0:
                 return
-            options = self.options if left is None else {**self.options, "time_limit": max(left, 1e-3)}
-            yield place, map_row, (self.make, value, self.interval, options)
+            own = options if left is None else {**options, "time_limit": max(left, 1e-3)}
+            yield place, map_row, (make, value, interval, own)
 
-    def _left(self) -> float | None:
-        """Seconds, 0 where the time is over; None without a limit."""
-        return None if self.seconds is None else max(self.seconds - (time.perf_counter() - self.started), 0.0)
-
-    def result(self, reason: str | None = None) -> MultiplicityMap:
-        """The map of what was done."""
-        left = [value for k, value in enumerate(self.values) if k not in self.done]
+    def result(reason: str | None = None) -> MultiplicityMap:
+        left = len(values) - len(done)
         why = reason or ("stopped by the time limit" if left else None)
-        missing = f"{why}, {counted(len(left), 'value')} not done" if why is not None else None
-        rows = tuple(self.done[k] for k in sorted(self.done))
-        ends = float(self.interval[0]), float(self.interval[1])
-        return MultiplicityMap(self.name, ends, rows, missing)
+        missing = None if why is None else f"{why}, {counted(left, 'value')} not done"
+        rows, ends = tuple(done[k] for k in sorted(done)), (float(interval[0]), float(interval[1]))
+        return MultiplicityMap(name, ends, rows, missing)
+
+    def work() -> MultiplicityMap:
+        with workers_of(executor, jobs) as pool, closing(spread(pool, calls())) as found:
+            for place, row in found:
+                done[place] = row
+                if progress is not None:
+                    progress(len(done), len(values))
+        return result()
+
+    return keeping(
+        "multiplicity_map",
+        work,
+        lambda ending: result(str(Stop(StopReason.of(ending)))),
+        lambda _: f" after {len(done)} of {counted(len(values), 'value')}",
+    )
 
 
 class MultiplicityMap(Immutable):

@@ -36,7 +36,8 @@ from enumsol.support.messages import html_lines
 MAGIC = b"enumsol-proof 2\n"
 #: Version of the format, as headers have it.
 PROOF_VERSION = 2
-_DIGEST = 32
+#: Bytes of the digest at the end.
+DIGEST = 32
 _CHUNK = 1 << 16
 #: Most characters that a byte of a file may stand for. The level at which proofs are written does not go beyond 1 : 230
 #: even for one character repeated; a file that does was made to be expanded.
@@ -186,7 +187,7 @@ class Proof:
                     f"proof {self._name} is not a proof file; expected it to begin with 'enumsol-proof'"
                 )
             digest = hashlib.sha256(start)
-            left = size - len(MAGIC) - _DIGEST
+            left = size - len(MAGIC) - DIGEST
             while left > 0 and (chunk := file.read(min(_CHUNK, left))):
                 digest.update(chunk)
                 left -= len(chunk)
@@ -204,7 +205,7 @@ class Proof:
         with self._open() as file:
             size = file.seek(0, io.SEEK_END)
             file.seek(len(MAGIC))
-            for line in lines_of(_expanded(file, size), size):
+            for line in lines_of(expanded(file, size), size):
                 yield decoded(line)
 
     def __repr__(self) -> str:
@@ -222,13 +223,13 @@ def _reason(error: Exception) -> str:
     return error.strerror if isinstance(error, OSError) and error.strerror else str(error)
 
 
-def _expanded(file: BinaryIO, size: int) -> Iterator[bytes]:
-    """The decompressed stream in parts of at most _CHUNK bytes; ``file`` stands at its beginning."""
+def expanded(file: BinaryIO, size: int, chunk_size: int = _CHUNK) -> Iterator[bytes]:
+    """The decompressed stream in parts of at most _CHUNK bytes, read in chunks; ``file`` stands at its beginning."""
     inflate = zlib.decompressobj()
-    left = size - len(MAGIC) - _DIGEST
+    left = size - len(MAGIC) - DIGEST
     total, most = 0, EXPANSION * size + SMALL
     while left > 0 and not inflate.eof:
-        chunk = file.read(min(_CHUNK, left))
+        chunk = file.read(min(chunk_size, left))
         left -= len(chunk) or left
         full = True
         # a part that is not full has all that the chunk gives

@@ -24,7 +24,7 @@ import numpy as np
 
 from enumsol.errors import InvalidArgumentError
 from enumsol.proof.leaves import UndecidedRecord
-from enumsol.proof.proof_file import EXPANSION, MAGIC, PROOF_VERSION, SMALL, Proof, ProofFormatError, decoded, lines_of
+from enumsol.proof.proof_file import DIGEST, MAGIC, PROOF_VERSION, Proof, ProofFormatError, decoded, expanded, lines_of
 from enumsol.proof.reading import quoted, rational_text, same
 from enumsol.proof.records import DeclaredForm
 from enumsol.support.files import check_replaceable, writing
@@ -407,30 +407,15 @@ class BegunProof:
         return ProofExtent(needed, nodes, undecided)
 
     def _records(self) -> Iterator[Any]:
-        for line in self._lines():
-            try:
-                yield decoded(line)
-            except ProofFormatError:
-                return
+        with contextlib.suppress(ProofFormatError):
+            yield from map(decoded, self._lines())
 
     def _lines(self) -> Iterator[bytes]:
-        try:
-            yield from lines_of(self._expanded(), self._place.stat().st_size)
-        except ProofFormatError:
-            return  # the last line is not whole
-
-    def _expanded(self) -> Iterator[bytes]:
-        """The decompressed stream as far as it goes; at most EXPANSION times the size of the file."""
-        inflate = zlib.decompressobj()
-        with self._place.open("rb") as file:
-            left = EXPANSION * self._place.stat().st_size + SMALL
+        size = self._place.stat().st_size
+        # the last line may not be whole, and no digest may stand at the end
+        with self._place.open("rb") as file, contextlib.suppress(ProofFormatError):
             file.seek(len(MAGIC))
-            with contextlib.suppress(zlib.error):
-                while left > 0 and not inflate.eof and (chunk := inflate.unconsumed_tail or file.read(_CHUNK)):
-                    part = inflate.decompress(chunk, 1 << 16)
-                    left -= len(part)
-                    yield part
-                yield inflate.flush()
+            yield from lines_of(expanded(file, size + DIGEST, _CHUNK), size)
 
 
 def begun_proof(place: Path, header: dict[str, Any]) -> BegunProof | None:
