@@ -29,10 +29,9 @@ from enumsol.model.statuses import (
 from enumsol.roots.local_branch import SelectionTangent, SlipSigns, named_statuses, sign_over
 from enumsol.roots.root import Enclosure, Polytope, Root, RootFamily
 from enumsol.roots.root_set import Undecided
-from enumsol.search.certifiers.float_certifier import FastCertifier
 from enumsol.search.outcome import SearchLimits
 from enumsol.search.reduction import Reduction
-from enumsol.search.solvers import plane_search
+from enumsol.search.solvers import FastCertifier, plane_search
 from enumsol.search.splitting import PlaneSplitting
 from enumsol.selections.float_selections import FloatSelections
 from enumsol.selections.solution import ActiveSets, SelectionSolution, SelectionSolver, VertexLimitError
