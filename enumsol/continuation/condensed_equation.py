@@ -5,7 +5,6 @@ H is the residual of a contact problem; with it come its test functions and sele
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 from types import MappingProxyType
 
@@ -25,10 +24,8 @@ from enumsol.model.statuses import (
     SLIP_MINUS,
     SLIP_PLUS,
     STICK,
-    ContactStatus,
     RowKind,
     active_within,
-    contact_status,
 )
 from enumsol.support.arguments import instance_of, positive_number
 from enumsol.support.array_arguments import plain_array, real_array
@@ -264,9 +261,6 @@ class CondensedEquation(ScaledEquation):
         rows[_CONES] /= 1.0 + values.F[:, None]
         return self._of_inequalities(codes, rows, 0.0)
 
-    def _touching(self, i: int, x: Floats) -> int:
-        return SLIP_PLUS if self.w(x)[self.p + i] > 0 else SLIP_MINUS
-
     def active(self, x: Floats, tolerance: float = STATUS_TOLERANCE) -> tuple[frozenset[int], ...]:
         """Per node the status codes whose equations and conditions hold within the tolerance."""
         return active_within(self._row_values(x), ~self.frictionless, tolerance)
@@ -276,13 +270,6 @@ class CondensedEquation(ScaledEquation):
         slips = np.where(upper + lower > 0, SLIP_PLUS, SLIP_MINUS)
         rubs = np.where((upper < 0) & (lower > 0), STICK, slips)
         return tuple(np.where(normal <= 0, OPEN, np.where(self.frictionless, FRICTIONLESS, rubs)).tolist())
-
-    def statuses(self, codes: Sequence[int], slip: Floats) -> tuple[ContactStatus, ...]:
-        """Names of the statuses; a frictionless node in contact is named by the sign of its u_t."""
-        return tuple(contact_status(code, float(u)) for code, u in zip(codes, slip, strict=True))
-
-
-_NAMES = {OPEN: ContactStatus.OPEN, STICK: ContactStatus.STICK, SLIP: ContactStatus.SLIP}
 
 
 @dataclass(frozen=True)
@@ -436,9 +423,6 @@ class DiscEquation(ScaledEquation):
         found[:, 1] = np.where((named == SLIP)[:, None], along, 0.0)
         return found
 
-    def _touching(self, i: int, x: Floats) -> int:
-        return SLIP
-
     def active(self, x: Floats, tolerance: float = STATUS_TOLERANCE) -> tuple[frozenset[int], ...]:
         """Per node the status codes whose equations and conditions hold within the tolerance."""
         found: list[set[int]] = [set() for _ in range(self.p)]
@@ -460,12 +444,6 @@ class DiscEquation(ScaledEquation):
         slips = self._trial(x, ones, cone).length >= cone.c * np.maximum(normal, 0.0)
         touching = np.where(self.frictionless, FRICTIONLESS, np.where(slips, SLIP, STICK))
         return tuple(np.where(normal > 0, touching, OPEN).tolist())
-
-    def statuses(self, codes: Sequence[int], slip: Floats) -> tuple[ContactStatus, ...]:
-        """Names of the statuses; a frictionless node in contact slips wherever its u_t is not 0."""
-        moves = np.any(np.reshape(slip, (2, -1)) != 0, axis=0)
-        without = (ContactStatus.STICK, ContactStatus.SLIP)
-        return tuple(_NAMES.get(code, without[bool(move)]) for code, move in zip(codes, moves, strict=True))
 
 
 def _flat(normal: Floats, tangential: Floats) -> Floats:

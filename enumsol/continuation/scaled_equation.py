@@ -35,7 +35,7 @@ from enumsol.condensation.condensed import condensation_of, solved
 from enumsol.condensation.factorization import RHS_BLOCK
 from enumsol.errors import InvalidArgumentError
 from enumsol.model.problem import check_is_problem
-from enumsol.model.statuses import FRICTIONLESS, OPEN
+from enumsol.model.statuses import FRICTIONLESS, OPEN, contact_status, space_status
 from enumsol.roots.local_branch import LocalBranchTest, NodeSlips, coherent_orientation
 from enumsol.support.arguments import alpha_value, optional_callable
 from enumsol.support.array_arguments import real_array
@@ -477,12 +477,10 @@ class ScaledEquation(ABC):
         i, k = which
         new = self.neighbours[codes[i]][k][0]
         if codes[i] == OPEN:
-            new = FRICTIONLESS if self.frictionless[i] else self._touching(i, x)
+            forward, *others, _ = self.neighbours[OPEN][k]
+            backward = bool(others) and not self.w(x)[self.p + i] > 0
+            new = FRICTIONLESS if self.frictionless[i] else others[0] if backward else forward
         return (*codes[:i], new, *codes[i + 1 :])
-
-    @abstractmethod
-    def _touching(self, i: int, x: Floats) -> int:
-        """Status of node i, which has friction and comes into contact."""
 
     @abstractmethod
     def active(self, x: Floats, tolerance: float = STATUS_TOLERANCE) -> tuple[frozenset[int], ...]:
@@ -500,9 +498,11 @@ class ScaledEquation(ABC):
     def _codes(self, x: Floats) -> Codes:
         """Statuses at a solution, which do not depend on the r of H."""
 
-    @abstractmethod
     def statuses(self, codes: Sequence[int], slip: Floats) -> tuple[ContactStatus, ...]:
         """Names of the statuses; that of a frictionless node in contact follows from its u_t, ``slip`` (m - p,)."""
+        if self.m == 2 * self.p:
+            return tuple(map(contact_status, codes, slip.tolist()))
+        return tuple(map(space_status, codes, slip.reshape(2, -1).T))
 
     # -- signs of determinants ---------------------------------------------------------------------------------------
 
