@@ -19,7 +19,7 @@ from enumsol.roots.root import Enclosure, Root
 from enumsol.roots.root_set import RigidBound, RootSet, SearchStats, Undecided
 from enumsol.search.certifiers.protocol import UndecidedPart
 from enumsol.search.outcome import AWAY, HOLD, SearchLimits, SearchOutcome, SearchProgress, Stop, StopReason
-from enumsol.search.setup import SearchSetup, SpreadSearch, resume
+from enumsol.search.setup import Replay, SearchSetup, SpreadSearch
 from enumsol.support.deadlines import Deadline, within
 
 if TYPE_CHECKING:
@@ -135,7 +135,7 @@ class Enumeration(ABC, Generic[_Solvers]):
                 search.loop = spread.run
             try:
                 if earlier:
-                    resume(search, solvers.reader(), *earlier)
+                    Replay(search, solvers.limits, solvers.enclosed).run(*earlier)
                 else:
                     search.run()
             finally:

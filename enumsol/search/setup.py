@@ -24,7 +24,7 @@ from enumsol.search.certifiers.protocol import NO_BOUND, RecordedBound, Refine, 
 from enumsol.search.nodes import Relaxations, TreeNode
 from enumsol.search.parts import Answer, Spread, TreePart
 from enumsol.search.reduction import LoneProposal
-from enumsol.search.tree import TreeSearch
+from enumsol.search.tree import REPORT_EVERY, TreeSearch
 from enumsol.support.deadlines import within
 
 if TYPE_CHECKING:
@@ -275,9 +275,15 @@ class SearchSetup(ABC):
     def certifier(self, recorder: Recorder | None) -> Certifier:
         """The certifier of this arithmetic, which writes to a recorder."""
 
+    @property
     @abstractmethod
-    def reader(self) -> Reader:
-        """Understands the records of an earlier proof."""
+    def enclosed(self) -> Any:
+        """Balls for the scaled system; None where there are none."""
+
+    @property
+    @abstractmethod
+    def limits(self) -> records.Limits:
+        """Limits of the records at the root of the tree of a proof."""
 
     @abstractmethod
     def remake(self) -> Callable[[], SearchSetup]:
@@ -432,111 +438,58 @@ class SpreadSearch(Spread):
         super().cancel()
 
 
-#: Progress is reported after so many nodes.
-_REPORT_EVERY = 64
-
-
-class Reader:
-    """Understands the records of one proof.
-
-    Parameters
-    ----------
-    limits : Limits
-        Of the root of its tree, without the forms that are declared.
-    system : balls for the data, of which forms are made; None where there are none
-    """
-
-    def __init__(self, limits: records.Limits, system: EnclosedSystem | None) -> None:
-        self._limits, self._system = limits, system
-        self._declared: list[records.DeclaredForm] = []
-        #: Forms that were used, the last one last.
-        self._used: dict[records.DeclaredForm, Any] = {}
-
-    def declare(self, record: list[Any]) -> None:
-        """Take note of a form; ValueError where the record makes no sense."""
-        said = records.DeclaredForm.read(record, self._limits)
-        # parts of one search declare the same form
-        self._declared.append(next((known for known in self._used if known.same(said)), said))
-
-    def read(self, codes: Codes, record: list[Any]) -> Any:
-        """A leaf; None or ValueError where the record makes no sense."""
-        kind = leaves.kind_of(record, self._limits.tree)
-        return kind and kind.read(record, replace(self._limits, codes=codes, declared=self._declared))
-
-    def form_over(self, codes: Codes) -> Any:
-        """The form that was used last of those that serve a partial assignment in place of the energy."""
-        return next((form for said, form in reversed(self._used.items()) if said.serves(codes)), None)
-
-    def bound(self, leaf: leaves.Excluded) -> Bound:
-        """Bound that is said to exclude a partial assignment; ValueError where its form is not proven."""
-        if not isinstance(leaf.by, int):
-            return RecordedBound(leaf.rows, leaf.values)
-        said = self._declared[-leaf.by]
-        form = self._used.pop(said) if said in self._used else self._system and said.form(self._system)
-        if form is None:
-            raise ValueError("its form is not proven")
-        self._used[said] = form
-        return RecordedBound(leaf.rows, leaf.values, form)
-
-
-def resume(search: TreeSearch, reader: Reader, begun: BegunProof, passed: Callable[[], None]) -> None:
-    """Go on with an earlier proof (for ``passed`` see Replay.run); a time limit is about what is searched anew."""
-    limits, mark = search.limits, time.perf_counter()
-
-    def below(*items: TreeNode, trial: bool = False) -> None:
-        nonlocal mark
-        if limits.deadline is not None:
-            limits.deadline += time.perf_counter() - mark
-        search.below(items, reader.form_over(items[-1].codes), trial=trial)
-        mark = time.perf_counter()
-
-    def through() -> None:
-        search.finish()  # the file that is replaced holds what was written after the subtrees that were skipped
-        passed()
-
-    rest = Replay(search, reader, below).run(begun, through)
-    if len({reader.form_over(item.codes) for item in rest}) > 1:
-        while rest:
-            below(rest.pop())
-    elif rest:
-        below(*rest, trial=search.forms is not None and not search.forms.tried(search.outcome.resumed))
-    search.finish()
-
-
 class Replay:
-    """Goes through an earlier proof.
+    """A search that goes on with an earlier proof.
 
     Parameters
     ----------
     search : TreeSearch
         Its certifier proves and writes.
-    reader : Reader
-    below : callable
-        Searches a subtree, in the place where its record is due.
+    limits : Limits
+        Of the records at the root of its tree, without the forms that are declared.
+    system : balls for the data, of which forms are made; None where there are none
     """
 
-    def __init__(self, search: TreeSearch, reader: Reader, below: Callable[[TreeNode], None]) -> None:
-        self._search, self._reader, self._below = search, reader, below
+    def __init__(self, search: TreeSearch, limits: records.Limits, system: EnclosedSystem | None) -> None:
+        self._search, self._limits, self._system = search, limits, system
         #: Whether the rule by which the file's tree was branched is still to be found out, from its first branchings.
         self._learning = search.forms is not None and search.lookahead.pays
+        self._declared: list[records.DeclaredForm] = []
+        #: Forms that were used, the last one last.
+        self._used: dict[records.DeclaredForm, Any] = {}
+        self._mark = time.perf_counter()
 
-    def run(self, begun: BegunProof, passed: Callable[[], None]) -> list[TreeNode]:
-        """Take over what holds; gives the subtrees that the file does not reach, the first one last.
+    def run(self, begun: BegunProof, passed: Callable[[], None]) -> None:
+        """Take over what holds, and search the rest; a time limit is about what is searched anew.
 
         ``passed`` is called once all that is proven in the file, and can be followed, has been gone through.
         """
-        outcome, extent = self._search.outcome, begun.extent()
-        needed, outcome.held, outcome.held_open = extent
-        stack = [self._search.first()]
+        search = self._search
+        needed, search.outcome.held, search.outcome.held_open = begun.extent()
+        rest = [search.first()]
         for number, record in enumerate(begun.records() if needed else (), start=1):
-            if not stack or not isinstance(record, list) or not record or not self._take(stack, record):
+            if not rest or not isinstance(record, list) or not record or not self._take(rest, record):
                 break
             if number == needed:
-                break  # what follows is open, and all of it on the stack
-            if outcome.resumed % _REPORT_EVERY == 0:
-                self._search.report()
+                break  # what follows is open, and all of it waits
+            if search.outcome.resumed % REPORT_EVERY == 0:
+                search.report()
+        search.finish()  # the file that is replaced holds what was written after the subtrees that were skipped
         passed()
-        return stack
+        if len({self._form_over(item.codes) for item in rest}) > 1:
+            while rest:
+                self._below(rest.pop())
+        elif rest:
+            self._below(*rest, trial=search.forms is not None and not search.forms.tried(search.outcome.resumed))
+        search.finish()
+
+    def _below(self, *items: TreeNode, trial: bool = False) -> None:
+        """Search subtrees, in the place where their records are due."""
+        limits = self._search.limits
+        if limits.deadline is not None:
+            limits.deadline += time.perf_counter() - self._mark
+        self._search.below(items, self._form_over(items[-1].codes), trial=trial)
+        self._mark = time.perf_counter()
 
     def _take(self, stack: list[TreeNode], record: list[Any]) -> bool:
         """Take one record; False if it and what follows make no sense."""
@@ -544,9 +497,11 @@ class Replay:
         self._learning = False
         if record[0] == records.DeclaredForm.kind:
             try:
-                self._reader.declare(record)
+                said = records.DeclaredForm.read(record, self._limits)
             except ValueError:
                 return False
+            # parts of one search declare the same form
+            self._declared.append(next((known for known in self._used if known.same(said)), said))
             return True
         item = stack.pop()
         if record[0] != records.Branching.kind:
@@ -572,12 +527,13 @@ class Replay:
         """True if a leaf is proven again, and written."""
         search = self._search
         try:
-            leaf = self._reader.read(item.codes, record)
+            kind = leaves.kind_of(record, self._limits.tree)
+            leaf = kind and kind.read(record, replace(self._limits, codes=item.codes, declared=self._declared))
             if isinstance(leaf, leaves.Unbalanced):
                 # the certifier finds a direction of its own
                 return search.excluded(item, NO_BOUND)
             if isinstance(leaf, leaves.Excluded):
-                return search.excluded(item, self._reader.bound(leaf))
+                return search.excluded(item, self._bound(leaf))
             if isinstance(leaf, leaves.Alone) and leaf.strengths is not None and leaf.terms is not None:
                 proposal = LoneProposal(leaf.selection, leaf.numbers, leaf.strengths)
                 return search.alone(item, proposal, RecordedBound(*leaf.terms))
@@ -588,3 +544,18 @@ class Replay:
         if isinstance(leaf, records.ClosingRecord):
             return search.closed(item, search.relaxations.energy(item.codes), again=True)
         return isinstance(leaf, leaves.Solved) and search.settled(item)
+
+    def _form_over(self, codes: Codes) -> Any:
+        """The form that was used last of those that serve a partial assignment in place of the energy."""
+        return next((form for said, form in reversed(self._used.items()) if said.serves(codes)), None)
+
+    def _bound(self, leaf: leaves.Excluded) -> Bound:
+        """Bound that is said to exclude a partial assignment; ValueError where its form is not proven."""
+        if not isinstance(leaf.by, int):
+            return RecordedBound(leaf.rows, leaf.values)
+        said = self._declared[-leaf.by]
+        form = self._used.pop(said) if said in self._used else self._system and said.form(self._system)
+        if form is None:
+            raise ValueError("its form is not proven")
+        self._used[said] = form
+        return RecordedBound(leaf.rows, leaf.values, form)

@@ -27,7 +27,7 @@ from enumsol.search.fathoming import Closer, holds_below, propose, without_load
 from enumsol.search.nodes import Forms, Relaxations, TreeCloser, plane_forms
 from enumsol.search.reduction import NEAR, WeightSource
 from enumsol.search.reference_closer import LeadingCloser
-from enumsol.search.setup import WEAK, Reader, SearchSetup, weakly_held
+from enumsol.search.setup import WEAK, SearchSetup, weakly_held
 from enumsol.search.splitting import PlaneSplitting
 from enumsol.search.tree import TreeSearch
 from enumsol.selections.float_selections import FloatSelections
@@ -314,12 +314,11 @@ class Solvers(SearchSetup):
             return not any(_present(self.exact).system.g)
         return super().unloaded()
 
-    def reader(self) -> Reader:
-        """Understands the records of an earlier proof."""
-        system, F = self.enclosed, (self.scaled.F > 0).tolist()
+    @property
+    def limits(self) -> Limits:
+        """Limits of the records at the root of the tree of a proof."""
         tree = Tree.PLANE if self.problem.held else Tree.FLOATING_PLANE
-        limits = Limits((UNDECIDED,) * self.problem.p, tree, F, modes=self.problem.modes.r)
-        return Reader(limits, system)
+        return Limits((UNDECIDED,) * self.problem.p, tree, (self.scaled.F > 0).tolist(), modes=self.problem.modes.r)
 
 
 def _present(value: _T | None) -> _T:

@@ -140,7 +140,7 @@ class Remainder:
 
 
 #: Progress is reported and limits on time are looked at after this many nodes.
-_REPORT_EVERY = 64
+REPORT_EVERY = 64
 #: Number of contact nodes from which a root is sought before the tree: of fewer the tree finds one sooner.
 _MANY = 24
 
@@ -462,7 +462,7 @@ class TreeSearch:
             outcome.stopped = Stop(StopReason.AT_LIMIT, outcome.nodes, unexamined=waiting)
         elif limits.over:
             outcome.stopped = Stop(StopReason.TIME_LIMIT, unexamined=waiting)
-        elif outcome.nodes % _REPORT_EVERY == 0:
+        elif outcome.nodes % REPORT_EVERY == 0:
             self.report()
         return outcome.stopped is not None
 

@@ -19,7 +19,7 @@ from enumsol.relaxation.convex_forms import SlipFormAscent
 from enumsol.relaxation.space_relaxation import SpaceEngine
 from enumsol.search.certifiers.protocol import Certifier, Unrecorded
 from enumsol.search.nodes import Forms, TreeCloser
-from enumsol.search.setup import WEAK, Reader, SearchSetup, weakly_held
+from enumsol.search.setup import WEAK, SearchSetup, weakly_held
 from enumsol.search.space.space_fathoming import SpaceCloser, SpaceClosing, solved
 from enumsol.search.space.space_search import SpaceCertifier, SpaceExclusions, SpaceSplitting
 
@@ -152,9 +152,9 @@ class SpaceSolvers(SearchSetup):
         other.__dict__.pop("_engine", None)
         return other
 
-    def reader(self) -> Reader:
-        """Understands the records of an earlier proof."""
+    @property
+    def limits(self) -> Limits:
+        """Limits of the records at the root of the tree of a proof."""
         system, tree = self.system, Tree.SPACE if self.problem.held else Tree.FLOATING_SPACE
         codes, modes = (UNDECIDED,) * system.p, self.problem.modes.r
-        limits = Limits(codes, tree, components=len(system.g), modes=modes)
-        return Reader(limits, self.enclosed)
+        return Limits(codes, tree, components=len(system.g), modes=modes)
