@@ -8,7 +8,7 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import closing
 from dataclasses import dataclass, replace
 from fractions import Fraction
-from functools import cached_property
+from functools import cached_property, partial
 from itertools import pairwise
 from textwrap import fill
 from typing import TYPE_CHECKING, Any
@@ -343,21 +343,11 @@ def _limit(row: MapRow) -> str:
 # -- the second parameter ----------------------------------------------------------------------------------------------
 
 
-@dataclass(frozen=True)
-class _Replaced:
-    """Makes a problem with another value of a field; other processes can import it."""
-
-    problem: ContactProblem
-    name: str
-    direction: Any = None
-
-    def __call__(self, value: float) -> ContactProblem:
-        """The problem at this value."""
-        if self.name == "load":
-            return self.problem.replace(f=self.problem.f + value * self.direction)
-        if self.name == "friction":
-            return self.problem.replace(friction=value, friction_slope=0.0)
-        return self.problem.replace(gap=value)
+def _replaced(problem: ContactProblem, name: str, direction: Any, value: float) -> ContactProblem:
+    """The problem with another value of a field (a module-level function, so that other processes can import it)."""
+    if name == "load":
+        return problem.replace(f=problem.f + value * direction)
+    return problem.replace(friction=value, friction_slope=0.0) if name == "friction" else problem.replace(gap=value)
 
 
 def _parameter(problem: object, over: object) -> tuple[str, Callable[[float], ContactProblem], list[float]]:
@@ -377,10 +367,10 @@ def _parameter(problem: object, over: object) -> tuple[str, Callable[[float], Co
         raise InvalidArgumentError(f"over is {arguments.shown(over)}; {_EXPECTED}")
     body = arguments.instance_of(problem, ContactProblem, "problem")
     if name != "load":
-        return name, _Replaced(body, name), _numbers(given)
+        return name, partial(_replaced, body, name, None), _numbers(given)
     if not isinstance(given, tuple) or len(given) != 2:
         raise InvalidArgumentError(f"over is {arguments.shown(over)}; {_EXPECTED}")
-    return name, _Replaced(body, name, vector_of(given[0], "direction", body.n)), _numbers(given[1])
+    return name, partial(_replaced, body, name, vector_of(given[0], "direction", body.n)), _numbers(given[1])
 
 
 def _numbers(values: object) -> list[float]:

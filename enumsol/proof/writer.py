@@ -18,7 +18,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from fractions import Fraction
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, BinaryIO, NamedTuple, Protocol
+from typing import TYPE_CHECKING, Any, BinaryIO, Protocol
 
 import numpy as np
 
@@ -346,24 +346,6 @@ _OPEN = (f'["{UndecidedRecord.kind}"'.encode(), b"{")
 _FORM = f'["{DeclaredForm.kind}"'.encode()
 
 
-class ProofExtent(NamedTuple):
-    """Extent of a proof that was begun.
-
-    Attributes
-    ----------
-    needed : int
-        How many records, after the header, a file that replaces it must hold: all up to the last that is proven.
-    nodes : int
-        Of all its records, those of nodes of the tree.
-    undecided : int
-        Nodes of these that are undecided.
-    """
-
-    needed: int
-    nodes: int
-    undecided: int
-
-
 class BegunProof:
     """A proof file as far as it goes.
 
@@ -396,15 +378,18 @@ class BegunProof:
         """Records after the header, up to the last one that is whole."""
         return itertools.islice(self._records(), 1, None)
 
-    def extent(self) -> ProofExtent:
-        """Extent of the file."""
+    def extent(self) -> tuple[int, int, int]:
+        """Extent of the file: records that a replacement must hold, nodes of the tree, and those that are undecided.
+
+        The first are all records after the header up to the last that is proven.
+        """
         needed = nodes = undecided = 0
         for number, line in enumerate(itertools.islice(self._lines(), 1, None), start=1):
             if not line.startswith(_OPEN):
                 needed = number
             nodes += line.startswith(b"[") and not line.startswith(_FORM)
             undecided += line.startswith(_OPEN[0])
-        return ProofExtent(needed, nodes, undecided)
+        return needed, nodes, undecided
 
     def _records(self) -> Iterator[Any]:
         with contextlib.suppress(ProofFormatError):
