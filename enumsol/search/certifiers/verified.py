@@ -200,12 +200,14 @@ class VerifiedCertifier(protocol.Certifier):
         if proposal is not None and ball is not None and (told or (proposal.strict and not ball.is_wide)):
             return self._closed_by(proposal, ball)
         certifier = None if proposal is not None and proposal.hopeless else self._exact()
-        if certifier is not None and (exact := certifier.closing(codes, near)) is not None:
-            closing, solutions = exact
-            self._known += [solution.codes for solution in solutions]
-            self._escalations.rationals += 1
-            self._leaf(leaves.Closed(closing.selection, closing.free, closing.numbers, len(solutions)))
-            return solutions
+        if certifier is not None:
+            closing = propose(self._scaled, codes, near, exactly=True)
+            solutions = certifier.closed(codes, closing, near)
+            if closing is not None and solutions is not None:
+                self._known += [solution.codes for solution in solutions]
+                self._escalations.rationals += 1
+                self._leaf(leaves.Closed(closing.selection, closing.free, closing.numbers, len(solutions)))
+                return solutions
         found = None if proposal is None or ball is None or ball.is_wide else self._closed_by(proposal, ball)
         if found and proposal is not None and certifier is not None:
             exactly = certifier.solution_near(proposal)
