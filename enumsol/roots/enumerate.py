@@ -472,29 +472,18 @@ def roots_of_selections(problem: ContactProblem, alpha: Alpha, selections: Seque
     whole : no others hold
     """
     solvers = Solvers(problem, alpha, "verified", SIGN_TOLERANCE)
-    return _Selected(solvers, None, None, method="graph").select(selections, whole=whole)
-
-
-class _Selected(_Enumeration):
-    """The roots of given selections."""
-
-    def select(self, selections: Sequence[Codes], *, whole: bool) -> RootSet:
-        """Examine them one by one."""
-        outcome = self.outcome
-        self.unloaded = self.solvers.unloaded()
-        for codes in () if self.unloaded else selections:
-            outcome.selections += 1
-            found = self.certifier.selection(codes)
-            if isinstance(found, UndecidedPart):
-                outcome.undecided.append(found)
-            elif found is not None:
-                outcome.solutions.append(found)
-        if not whole:
-            outcome.stopped = Stop(StopReason.GRAPH_INCOMPLETE)
-        return self._result()
-
-    def _proof(self, **counts: int) -> None:
-        del counts
+    search = _Enumeration(solvers, None, None, method="graph")
+    search.writer, search.unloaded, outcome = None, solvers.unloaded(), search.outcome
+    for codes in () if search.unloaded else selections:
+        outcome.selections += 1
+        found = search.certifier.selection(codes)
+        if isinstance(found, UndecidedPart):
+            outcome.undecided.append(found)
+        elif found is not None:
+            outcome.solutions.append(found)
+    if not whole:
+        outcome.stopped = Stop(StopReason.GRAPH_INCOMPLETE)
+    return search._result()
 
 
 def _check_proof(arithmetic: str, method: str, proof_path: str | Path | None, resume: bool) -> None:
