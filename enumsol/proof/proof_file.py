@@ -45,14 +45,10 @@ EXPANSION = 256
 #: Longest record, in sizes of its file. A record is long by its multipliers, the digits of its points or the codes of
 #: its subtrees, none of which compress that far.
 RECORD_SHARE = 16
-#: Longest record of all.
-LONGEST_RECORD = 1 << 26
 #: Characters that the smallest file may hold; its few records may compress far.
 SMALL = 1 << 16
 #: In the bits of a double, half a unit of the upper 32 of them, and these.
 _HALF, _UPPER = np.uint64(1 << 31), np.uint64(0xFFFFFFFF << 32)
-#: Digits of a whole number and its sign; codes, exponents and counts have fewer.
-_WHOLE_DIGITS = 18
 
 
 class ProofFormatError(EnumsolError, ValueError):
@@ -251,7 +247,7 @@ def expanded(file: BinaryIO, size: int, chunk_size: int = _CHUNK) -> Iterator[by
 
 def lines_of(parts: Iterable[bytes], size: int) -> Iterator[bytes]:
     """The lines of a stream, the last one ended too."""
-    longest = min(LONGEST_RECORD, RECORD_SHARE * size + SMALL)
+    longest = min(1 << 26, RECORD_SHARE * size + SMALL)
     begun: list[bytes] = []
     length = 0
     for part in parts:
@@ -283,7 +279,8 @@ def _check_length(length: int, longest: int) -> None:
 
 
 def _whole(text: str) -> int:
-    if len(text) > _WHOLE_DIGITS:
+    # codes, exponents and counts have fewer digits
+    if len(text) > 18:
         raise ValueError(f"a whole number has {len(text)} digits")
     return int(text)
 

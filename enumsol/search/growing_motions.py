@@ -26,14 +26,10 @@ if TYPE_CHECKING:
 
 #: From one end of a range of mu to the other.
 STRIDE = 16.0
-#: Nodes at their limit up to which all sets of them are tried, and degrees of freedom up to which a spectrum is known.
-_ALL_SETS, _SPECTRUM = 8, 1500
-#: Nodes up to which all sets of them are counted for one certificate, and loads that are tried for it.
-_COUNTED, _LOADS = 8, 12
+#: Nodes at their limit up to which all sets of them are tried; and up to which all are counted for one certificate.
+_ALL_SETS = 8
 #: mu at which signs of determinants are compared within a range.
 _SAMPLES = 48
-#: Relative widths in which a motion is looked for, narrow ones first.
-_WIDTHS = (1e-8, 1e-6, 1e-4, 1e-3)
 
 
 class GrowingMotions:
@@ -90,7 +86,8 @@ class GrowingMotions:
             for at in zeros:
                 if at is None or any(abs(at - other) <= 1e-6 * at for other in seen):
                     continue
-                for width in _WIDTHS:
+                # relative widths, narrow ones first
+                for width in (1e-8, 1e-6, 1e-4, 1e-3):
                     tried = Growing(at * (1 - width), at * (1 + width), way)
                     if floats is not None and tried.found(floats, self.motions) is None:
                         continue
@@ -239,7 +236,8 @@ class Spectrum:
     @classmethod
     def of(cls, stiffness: DynamicStiffness) -> Spectrum | None:
         """None of a large body, or where the eigenvalues are not found."""
-        if stiffness.A.shape[0] > _SPECTRUM:
+        # degrees of freedom up to which a spectrum is known
+        if stiffness.A.shape[0] > 1500:
             return None
         if stiffness not in _SPECTRA:
             _SPECTRA[stiffness] = cls._found(stiffness)
@@ -286,14 +284,15 @@ def _push(L: Floats) -> Floats | None:
 def _load(L: Floats) -> Floats | None:
     """q for which the signs of all solutions of 0 <= x, q + L x >= 0 are known best, if they do not add up to 1."""
     k = len(L)
-    if not 0 < k <= _COUNTED or L.shape != (k, k):
+    if not 0 < k <= _ALL_SETS or L.shape != (k, k):
         return None
     unit = 1.0 / np.sqrt(np.maximum(np.abs(L.diagonal()), np.finfo(float).tiny))
     scaled = L * unit[:, None] * unit
-    loads = np.random.default_rng(k).normal(size=(k, _LOADS))
-    margins, degrees = np.full(_LOADS, np.inf), np.zeros(_LOADS)
+    # a dozen loads are tried
+    loads = np.random.default_rng(k).normal(size=(k, 12))
+    margins, degrees = np.full(12, np.inf), np.zeros(12)
     for chosen in itertools.product((False, True), repeat=k):
-        own, x = np.array(chosen), np.zeros((k, _LOADS))
+        own, x = np.array(chosen), np.zeros(loads.shape)
         part = scaled[np.ix_(own, own)]
         try:
             x[own] = -np.linalg.solve(part, loads[own])

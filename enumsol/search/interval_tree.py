@@ -31,8 +31,6 @@ if TYPE_CHECKING:
 TRIED_AT_ONCE = 2
 #: Nodes spent at the end on all that is to be left: without anything left there are no halves, which cost as much.
 TRIED_AT_THE_END = 128
-#: What was left so many times in a row gets twice as many nodes every further time: some alpha may be an event of it.
-PATIENCE = 2
 #: Nodes of one tree, after which the rest of it goes to further trees over the same piece.
 LARGEST_TREE = 4096
 #: A tree that leaves so many subtrees more than two for each of its roots is given up.
@@ -252,7 +250,8 @@ class SubintervalTree:
         """A last attempt at what is to be left to the halves, if it is little."""
         tried, self._result.cut = self._result.cut, []
         for subtree in tried:
-            nodes = TRIED_AT_THE_END * 2 ** max(0, subtree.left - PATIENCE) // len(tried)
+            # left so often in a row, some alpha may be an event of it: twice as many nodes every further time
+            nodes = TRIED_AT_THE_END * 2 ** max(0, subtree.left - 2) // len(tried)
             nodes = min(nodes, max_nodes - self._result.nodes)
             if nodes < 4 * TRIED_AT_ONCE or not self._settled([_first([subtree])], nodes):
                 self._result.cut.append(subtree)

@@ -163,8 +163,6 @@ def _at_limit(z: Floats, normals: Floats, across: Floats) -> Floats:
     return np.asarray(normals + np.einsum("pd,pdr->pr", along, across))
 
 
-#: Stiffness of the springs by which a solution of a body that nothing holds is approached, relative to the body's own.
-_SPRINGS = tuple(2.0**-k for k in range(0, 21, 4))
 #: That of the springs of its relaxations (theory, section 14.5).
 WEAK = 2.0**-20
 
@@ -332,7 +330,8 @@ class SearchSetup(ABC):
         Of a body that nothing holds, that of a family at the limit, then those on springs, the weakest first.
         """
         suggested, near = list[Any](), None
-        for stiffness in (0.0,) if self.problem.held else _SPRINGS:
+        # springs by which a solution of a body that nothing holds is approached, relative to its own stiffness
+        for stiffness in (0.0,) if self.problem.held else tuple(2.0**-k for k in range(0, 21, 4)):
             found = self._solved(self._on_springs(stiffness), near)
             if found is not None:
                 codes, near = found
