@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any, SupportsIndex
 import numpy as np
 import scipy.sparse as sp
 import scipy.sparse.linalg as spla
+from scipy.linalg import cho_solve
 from scipy.linalg.lapack import dgetrf, dtrtri
 
 if TYPE_CHECKING:
@@ -140,10 +141,7 @@ def dense_eigenvalue_bound(S: Array) -> float:
     A Cholesky factorization of S - mu I that runs to its end proves S - mu I >= -gamma trace (Rump 2006).
     """
     n = len(S)
-    try:
-        estimate = float(np.linalg.eigvalsh(S)[0])
-    except np.linalg.LinAlgError:
-        return 0.0
+    estimate = _smallest_eigenvalue(S)
     slack = gamma(n + 2) / (1 - gamma(n + 2)) * float(np.trace(np.abs(S))) * SAFE + TINY
     shift = 0.9 * estimate
     for _ in range(4):
@@ -154,6 +152,22 @@ def dense_eigenvalue_bound(S: Array) -> float:
             return (shift - slack - 4 * UNIT * (float(np.max(np.abs(np.diagonal(S)))) + shift)) / SAFE
         shift *= 0.5
     return 0.0
+
+
+def _smallest_eigenvalue(S: Array) -> float:
+    """An estimate of the smallest eigenvalue of a symmetric dense matrix, which need not be near if it is large."""
+    if len(S) <= 500:  # all eigenvalues of larger ones take longer than some steps of inverse iteration
+        try:
+            return float(np.linalg.eigvalsh(S)[0])
+        except np.linalg.LinAlgError:
+            return 0.0
+    L, x, size = factor_above(S), np.ones(len(S)), np.sqrt(len(S))
+    if L is None:
+        return 0.0
+    for _ in range(8):
+        x = cho_solve((L, True), x / size, check_finite=False)
+        size = np.linalg.norm(x)
+    return float(1.0 / size)
 
 
 def sparse_eigenvalue_bound(A: sp.csc_array, estimate: float) -> float:

@@ -1,4 +1,4 @@
-"""The trusted form of theory, (6.9) and (12.7), by which a solution is the only one, in 2D and 3D.
+"""The trusted form of theory, (6.9), by which a solution is the only one, in 2D and 3D.
 
 At one alpha, over a piece, and of a body that nothing holds it differs in the system and the rows that are handed in
 only: ``UniqueForm`` is definite for all changes of the forces, ``RootForm`` (theory, section 14.11) for those that are
@@ -63,7 +63,7 @@ class Multipliers:
         return form
 
     def taken(self, S: Ball, off: Floats, lost: Floats) -> Ball:
-        """The most that a theta which is off takes from the form (theory, (6.9), (7.18) and (12.8)).
+        """The most that a theta which is off takes from the form (theory, section 6.11 and (7.18)).
 
         ``lost``: any positive numbers where ``off`` is positive; elsewhere both are 0.
         """

@@ -221,7 +221,7 @@ def test_the_sum_over_two_solutions_is_not_negative():
 
 @pytest.mark.slow
 def test_any_theta_that_the_gap_allows_serves():
-    """An open node, against all states that a node can have (theory, (12.6))."""
+    """An open node, against all states that a node can have (theory, (6.8))."""
     rng, tight = np.random.default_rng(3), 0
     for _ in range(some(800, of=3000)):
         v, gap = rng.normal(size=2) * 10 ** rng.uniform(-2, 1), 10 ** rng.uniform(-2, 1)

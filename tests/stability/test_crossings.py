@@ -1,4 +1,4 @@
-"""Ranges of mu in which some motion grows by Theorem 15.6, against all sets of sliding nodes in floats."""
+"""Ranges of mu in which a motion grows (theory, section 15.4), against all sets of sliding nodes in floats."""
 
 import dataclasses
 from collections import Counter
@@ -153,7 +153,7 @@ def test_verdicts_along_arcs_are_those_of_their_roots():
 
 
 def test_an_arc_of_a_wedge_along_which_two_nodes_slide():
-    """Of a wedge with five equilibria; its motions were found at single alphas only (theory, Theorem 15.7)."""
+    """Of a wedge with five equilibria; its motions were found at single alphas only (theory, section 15.4)."""
     problem = enumsol.gallery.get("wedge-8-5").build()
     graph = enumsol.branch_graph(problem, (2.5, 3))
     (arc,) = [arc for arc in graph.arcs if [str(of) for of in arc.statuses].count("open") == 6 and arc.index == -1]

@@ -96,7 +96,7 @@ def test_forty_bodies_that_do_not_run_away():
 
 
 def test_slip_and_stick_in_turn_may_grow():
-    """Theory, section 15.1: what does not run away may be unstable all the same."""
+    """What does not run away may be unstable all the same (theory, section 15.1)."""
     rows, one = np.eye(4), np.ones(1)
     data = STICK_SLIP_A, np.eye(4), rows[:1], rows[1:2], np.array([STICK_SLIP_F]), ["limit"], one
     assert growing_motions(*data) == []

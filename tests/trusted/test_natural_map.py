@@ -1,4 +1,4 @@
-"""Derivatives of the projection onto discs in boxes (theory, (12.12) and (12.17)), against differences of P itself."""
+"""Derivatives of the projection onto discs in boxes (theory, (12.11)), against differences of P itself."""
 
 from fractions import Fraction
 

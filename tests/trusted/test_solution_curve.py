@@ -166,7 +166,7 @@ def test_what_is_no_box_is_refused(box):
 
 
 def test_both_components_of_a_tangential_force_have_one_step():
-    """With two the natural map has another curve of zeros, which are no solutions (theory, (12.16))."""
+    """With two the natural map has another curve of zeros, which are no solutions (theory, (12.10))."""
 
     def found(ratio, steps):
         low, x, high = (placed(GIVEN, np.append(sliding_node(alpha, ratio), alpha)) for alpha in (0.49, 0.5, 0.51))

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any, Protocol
 import numpy as np
 import scipy.linalg
 
+from enumsol.arithmetic.balls import factor_above
 from enumsol.model.sectors import SECTORS, nearest, start_of
 from enumsol.model.statuses import CONTACT, FRICTIONLESS, OPEN, SLIP_MINUS, SLIP_PLUS, STICK, UNDECIDED
 from enumsol.search.nodes import TreeCloser
@@ -301,6 +302,9 @@ class DefiniteForm:
         Plain ones, or better ones if these are asked for and plain ones are not below ``hopeless``.
         """
         logs, shares = np.zeros((2, self._system.p)), np.zeros((self._system.p, 2))
+        plain = self._numbers(logs, shares)
+        if all(factor_above(self._matrix(turn, *plain) - enough * self._S) is not None for turn in self._turns):
+            return plain
         least = self.least(logs, shares)
         if least <= enough and better and least > hopeless:
             logs, shares, least = self.improved(logs, shares, least)

@@ -100,7 +100,7 @@ class Isotropic:
 
     def _newton(self, y: Floats, radius: float) -> Floats | None:
         """A solution for discs |tau| <= radius lambda_n from a point near it, (3 p,)."""
-        H, J = self._natural(y, radius)
+        H, slopes = self._natural(y, radius)
         size, best, waited = self._merit(H), np.inf, 0
         for _ in range(40):
             if size <= _SOLVED:
@@ -109,12 +109,8 @@ class Isotropic:
             if waited > 12:  # so many steps without a merit half as large
                 return None
             look()
-            try:
-                # in the units of the system, in which no row is small
-                step = np.linalg.solve(J / self.unit[:, None] * self.unit, H / self.unit) * self.unit
-            except np.linalg.LinAlgError:
-                return None
-            if not np.all(np.isfinite(step)):
+            step = self._step(H, slopes)
+            if step is None:
                 return None
             share = 1.0
             for _ in range(7):
@@ -123,34 +119,46 @@ class Isotropic:
                 if self._merit(found[0]) < size:
                     break
                 share *= 0.5
-            y, (H, J) = trial, found
+            y, (H, slopes) = trial, found
             size = self._merit(H)
         return y if size <= _SOLVED else None
 
     def _merit(self, H: Floats) -> float:
         return float(np.linalg.norm(H / self.unit))
 
+    def _step(self, H: Floats, slopes: Floats) -> Floats | None:
+        """The solution of J step = H, J = I - D (I - rho S), solved for where D is not 0; elsewhere step = H."""
+        moving = np.flatnonzero(np.any(slopes, axis=(1, 2)))
+        D, S = slopes[moving], self.S.reshape(-1, 3, len(H))[moving] * self.rho.reshape(-1, 3, 1)[moving]
+        J = (D @ S).reshape(-1, len(H))
+        rows = (3 * moving[:, None] + np.arange(3)).ravel()
+        step = H.copy()
+        step[rows] = 0.0
+        given = H[rows] - J @ step
+        J = J[:, rows]
+        for i, j in np.ndindex(3, 3):
+            J[i::3, j::3][np.diag_indices(len(moving))] += (i == j) - D[:, i, j]
+        try:
+            # in the units of the system, in which no row is small
+            unit = self.unit[rows]
+            step[rows] = np.linalg.solve(J / unit[:, None] * unit, given / unit) * unit
+        except np.linalg.LinAlgError:
+            return None
+        return step if np.all(np.isfinite(step)) else None
+
     def _natural(self, y: Floats, radius: float) -> tuple[Floats, Floats]:
-        """The natural map y - P(y + rho w), with discs as large as y + rho w has lambda_n, and its Jacobian."""
-        m = len(y)
-        z, dz = y + self.rho * (self.g - self.S @ y), np.eye(m) - self.rho[:, None] * self.S
-        H, J = y.copy(), np.eye(m)
-        normal = np.arange(0, m, 3)
-        closed = z[normal] > 0
-        most = radius * np.where(closed, z[normal], 0.0)
-        slope = radius * np.where(closed[:, None], dz[normal], 0.0)
-        H[normal[closed]] -= z[normal[closed]]
-        J[normal[closed]] -= dz[normal[closed]]
-        pair = z.reshape(-1, 3)[:, 1:]
+        """The natural map y - P(z), z = y + rho w, with discs as large as z has lambda_n, and dP/dz, (p, 3, 3)."""
+        z = (y + self.rho * (self.g - self.S @ y)).reshape(-1, 3)
+        closed, pair = z[:, 0] > 0, z[:, 1:]
+        normal = np.where(closed, z[:, 0], 0.0)
         length = np.linalg.norm(pair, axis=1)
-        inside = length <= most
+        inside = length <= radius * normal
         safe = np.where(inside, 1.0, length)
         e = pair / safe[:, None]
-        first, second = normal + 1, normal + 2
-        along = e[:, :1] * dz[first] + e[:, 1:] * dz[second]
-        bend = (most / safe)[:, None]
-        for k, t in enumerate((first, second)):
-            H[t] -= np.where(inside, pair[:, k], most * e[:, k])
-            across = slope * e[:, k, None] + bend * (dz[t] - e[:, k, None] * along)
-            J[t] -= np.where(inside[:, None], dz[t], across)
-        return H, J
+        bend = np.where(inside, 1.0, radius * normal / safe)
+        slides = ~inside & closed
+        slopes = np.zeros((len(z), 3, 3))
+        slopes[:, 0, 0] = closed
+        slopes[:, 1:, 1:] = bend[:, None, None] * (np.eye(2) - slides[:, None, None] * e[:, :, None] * e[:, None, :])
+        slopes[:, 1:, 0] = radius * slides[:, None] * e
+        return y - np.column_stack([normal, bend[:, None] * pair]).ravel(), slopes

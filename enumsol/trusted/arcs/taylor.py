@@ -58,7 +58,7 @@ class Smooth:
     def solution(cls, y: arb_mat, rise: arb_mat, P: arb_mat, sizes: Floats) -> Smooth | None:
         """The unknowns of M y = g, with y and their slopes ``rise`` at tau = 0 and P = M(0)^{-1} M'.
 
-        They are y + tau (I + tau P)^{-1} rise (theory, (7.16)). None where P is too large. ``sizes`` are at least those
+        They are y + tau (I + tau P)^{-1} rise (theory, (7.17)). None where P is too large. ``sizes`` are at least those
         of the entries of P.
         """
         terms = [y, rise]

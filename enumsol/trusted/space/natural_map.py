@@ -552,7 +552,7 @@ def _middle(x: Ball) -> tuple[Floats, Floats, Floats]:
 def are_steps(rho: Floats, tau: Indices) -> bool:
     """True if numbers serve as rho of a natural map: positive, and one for both components of tau of every node.
 
-    Zeros of a map with two numbers there are no solutions (theory, (12.10) and (12.16)).
+    Zeros of a map with two numbers there are no solutions (theory, (12.10)).
 
     Parameters
     ----------

@@ -223,7 +223,7 @@ def _is_final(code: int, tangents: int) -> bool:
 
 @dataclass(frozen=True)
 class SpaceWeights:
-    """The numbers of the form of theory, (12.7), node by node.
+    """The numbers of the form of theory, (6.9), node by node.
 
     Where there is no tau, components are 0.
 
@@ -283,7 +283,7 @@ class SpaceWeights:
         return Multipliers(system.tau, self.mu, self.kappa, self.turn(system), push, unit)
 
     def form(self, system: EnclosedSpace, held: Ball | None = None) -> UniqueForm | None:
-        """Q of theory, (12.7); None where it is not proven definite, or not with the squares of some rows."""
+        """Q of theory, (6.9); None where it is not proven definite, or not with the squares of some rows."""
         if not (system.smallest_eigenvalue > 0 and in_range(system)):
             return None
         S, wide = Ball(system.S, system.S_rad), self.wide > 0
@@ -294,7 +294,7 @@ class SpaceWeights:
         return np.array([self.off_at(system, i, y, w) for i in range(len(system.tau))])
 
     def gap_serves(self, system: EnclosedSpace, i: int, w: Ball) -> bool:
-        """True if theta of a node without load serves for all w in a ball, by its gap (theory, (12.6))."""
+        """True if theta of a node without load serves for all w in a ball, by its gap (theory, (6.8))."""
         places = system.tau[i]
         t, theta = places[places >= 0], self.theta[i][places >= 0]
         gap = -float(w.mid[i] + w.rad[i]) / SAFE
