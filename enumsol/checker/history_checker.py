@@ -10,7 +10,7 @@ import numpy as np
 from enumsol.checker.reports import MAX_FAILURES, HistoryVerificationReport
 from enumsol.checker.walk import ProofChecker
 from enumsol.condensation.enclosure import enclosure_of
-from enumsol.model.problem import SlipStart, afresh, restarted
+from enumsol.model.restart import SlipStart, afresh, restarted
 from enumsol.proof.reading import RefusedError, check_header, numbers_from, quoted, rational_from, same
 from enumsol.support.deadlines import heard_by, tell, tell_part
 from enumsol.trusted.positions import tangential_positions

@@ -22,7 +22,8 @@ from enumsol.fem.restrained import Body, Supports, axes_of, problem_of
 from enumsol.model.cells import KINDS, boundary_facets, by_kind, facet_outlines, facet_rows, lines_along
 from enumsol.model.mass import consistent_mass
 from enumsol.model.mesh import BodyMesh
-from enumsol.model.problem import afresh, given_friction
+from enumsol.model.problem import given_friction
+from enumsol.model.restart import afresh
 from enumsol.model.shapes import acting_nodes, signs
 from enumsol.support.arguments import finite_number, positive_number, shown
 from enumsol.support.array_arguments import short_vector

@@ -28,7 +28,8 @@ from enumsol.loading.history_data import (
     start_after,
 )
 from enumsol.loading.steps import LoadStep, steps_of, way_to
-from enumsol.model.problem import SlipStart, check_is_problem, restarted
+from enumsol.model.problem import check_is_problem
+from enumsol.model.restart import SlipStart, restarted
 from enumsol.roots.enumerate import enumerate_roots
 from enumsol.roots.root import Root
 from enumsol.search.outcome import Stop, StopReason

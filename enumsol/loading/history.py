@@ -17,7 +17,8 @@ from enumsol.condensation.condensed import condensation_of
 from enumsol.errors import InvalidArgumentError
 from enumsol.loading import history_data
 from enumsol.loading.steps import LoadStep
-from enumsol.model.problem import SlipStart, check_is_problem, restarted
+from enumsol.model.problem import check_is_problem
+from enumsol.model.restart import SlipStart, restarted
 from enumsol.model.statuses import ContactStatus
 from enumsol.proof.proof_file import Proof
 from enumsol.roots.root import Enclosure, Polytope, Root, RootFamily, summary

@@ -17,7 +17,7 @@ import numpy as np
 
 from enumsol.arithmetic.balls import SAFE, TINY, UNIT, Ball
 from enumsol.condensation.enclosure import NotEnclosedError
-from enumsol.model.problem import SlipStart
+from enumsol.model.restart import SlipStart
 from enumsol.model.statuses import FRICTIONLESS, ContactStatus
 from enumsol.proof.proof_file import PROOF_VERSION
 from enumsol.proof.reading import rational_text

@@ -7,7 +7,7 @@ from proof_tools import of_kind, proof_of, put, records_of, why_refused
 from trees import by_the_tree
 
 from enumsol import enumerate_roots, gallery
-from enumsol.model.problem import SlipStart, restarted
+from enumsol.model.restart import SlipStart, restarted
 
 
 def records(problem, alpha):

@@ -9,7 +9,7 @@ from helpers.floating_space import known_body
 
 import enumsol
 from enumsol.arithmetic.balls import Ball
-from enumsol.model.problem import SlipStart, restarted
+from enumsol.model.restart import SlipStart, restarted
 from enumsol.model.sectors import SECTORS
 from enumsol.trusted.positions import tangential_positions
 from enumsol.trusted.space.leaf_positions import leaf_positions

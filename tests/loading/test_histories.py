@@ -14,7 +14,7 @@ from refusals import bad_argument
 import enumsol
 from enumsol import ContactProblem, History, LoadStep, enumerate_roots, histories
 from enumsol.loading.history_data import Refinement
-from enumsol.model.problem import SlipStart, restarted
+from enumsol.model.restart import SlipStart, restarted
 
 
 def test_the_wedge_ends_jammed_or_free_by_the_branch_alone(out_again):

@@ -14,7 +14,7 @@ import enumsol
 from enumsol import ContactProblem, ContactProblem3D, FrictionTable, gallery
 from enumsol.condensation.factorization import Factorization
 from enumsol.condensation.products import Products
-from enumsol.model.problem import SlipStart, restarted
+from enumsol.model.restart import SlipStart, restarted
 
 
 def plane():

@@ -10,7 +10,7 @@ from history_oracle import exact_history
 
 import enumsol
 from enumsol.condensation.enclosure import enclosure_of
-from enumsol.model.problem import SlipStart, restarted
+from enumsol.model.restart import SlipStart, restarted
 from enumsol.trusted.at_alpha import MOST_BETWEEN, joint_root
 from enumsol.trusted.status_rows import OPEN, SLIP_MINUS, SLIP_PLUS, STICK
 

@@ -10,7 +10,7 @@ from problems3d import from_compliance
 import enumsol
 from enumsol import fem
 from enumsol.arithmetic.balls import Ball
-from enumsol.model.problem import SlipStart, restarted
+from enumsol.model.restart import SlipStart, restarted
 from enumsol.model.sectors import SECTORS
 from enumsol.trusted.positions import tangential_positions
 from enumsol.trusted.space.leaf_positions import leaf_positions

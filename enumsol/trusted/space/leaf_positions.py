@@ -10,7 +10,7 @@ import numpy as np
 from enumsol.arithmetic.balls import SAFE, TINY, Ball, upper_norm, upper_sum
 from enumsol.condensation.enclosure import enclosure_of
 from enumsol.condensation.space_condensed import EnclosedSpace, SpaceSystem
-from enumsol.model.problem import SlipStart, restarted
+from enumsol.model.restart import SlipStart, restarted
 from enumsol.model.sectors import DEEPEST, SECTORS, places
 from enumsol.trusted.space.leaf_equations import ROUNDED_ANGLE, Leaf, State, turned
 from enumsol.trusted.space.leaves import SpaceRoot, contents
