@@ -8,7 +8,7 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Iterable, Sequence
 from contextlib import suppress
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from fractions import Fraction
 from itertools import pairwise
 from typing import TYPE_CHECKING, Any
@@ -264,11 +264,8 @@ def histories(
     arguments.instance_of(refine, bool, "refine")
     arguments.optional_executor(executor, jobs)
     arguments.optional_callable(progress, "progress")
-    limits = _Limits(
-        arguments.optional_count(max_branches, "max_branches"),
-        arguments.optional_count(max_nodes, "max_nodes"),
-        arguments.optional_seconds(time_limit),
-    )
+    counts = arguments.optional_count(max_branches, "max_branches"), arguments.optional_count(max_nodes, "max_nodes")
+    limits = _Limits(Deadline.after(time.perf_counter(), arguments.optional_seconds(time_limit)).deadline, *counts)
     fitted = steps_of(problem, steps)
     with workers_of(executor, jobs) as pool:
         search = {"arithmetic": arithmetic, "executor": pool, **options}
@@ -292,10 +289,9 @@ def histories(
 
 
 @dataclass
-class _Limits:
-    max_branches: int | None
-    max_nodes: int | None
-    seconds: float | None
+class _Limits(Deadline):
+    max_branches: int | None = None
+    max_nodes: int | None = None
     started: float = field(default_factory=time.perf_counter)
     nodes: int = 0
 
@@ -303,14 +299,13 @@ class _Limits:
         """Why nothing more is searched, or None."""
         if self.max_nodes is not None and self.nodes >= self.max_nodes:
             return f"stopped after max_nodes = {counted(self.max_nodes, 'node')}"
-        if self.seconds is not None and time.perf_counter() - self.started >= self.seconds:
-            return "stopped by the time limit"
-        return None
+        return "stopped by the time limit" if self.over else None
 
     def left(self) -> dict[str, Any]:
         """Nodes and time that one search may still take, as options of enumerate_roots."""
-        seconds = None if self.seconds is None else max(self.seconds - (time.perf_counter() - self.started), 1e-3)
-        return {"max_nodes": None if self.max_nodes is None else self.max_nodes - self.nodes, "time_limit": seconds}
+        seconds = self.remaining()
+        nodes = None if self.max_nodes is None else self.max_nodes - self.nodes
+        return {"max_nodes": nodes, "time_limit": None if seconds is None else max(seconds, 1e-3)}
 
 
 @dataclass
@@ -493,7 +488,7 @@ class _Growing:
     def _verdicts(self, stage: Stage) -> Sequence[Stability] | None:
         """The verdicts on the roots of a stage, or None where the time is over."""
         try:
-            with within(Deadline.after(self.limits.started, self.limits.seconds)):
+            with within(self.limits):
                 return stage.roots.stability()
         except TimeOverError:
             return None

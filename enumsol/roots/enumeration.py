@@ -88,13 +88,16 @@ class Enumeration(ABC, Generic[_Solvers]):
         self, executor: Executor | None, stop_after: int | None, max_nodes: int | None, time_limit: float | None
     ) -> RootSet:
         """Search, then build the result."""
-        until = Deadline.after(self.started, time_limit)
-        limits = SearchLimits(None if stop_after is None else self._enough(stop_after), max_nodes, until.deadline)
+        enough, until = (
+            None if stop_after is None else self._enough(stop_after),
+            Deadline.after(self.started, time_limit),
+        )
+        limits = SearchLimits(until.deadline, enough, max_nodes)
         self._search(limits, executor)
         if self.writer is not None:
             self.writer.replace()
         # a search that goes on with an earlier one has moved its deadline
-        with within(Deadline(limits.deadline).extended(self.started)):
+        with within(limits.extended(self.started)):
             result = self._result()
         if self.writer is not None and self.writer.failure is not None:
             raise OutputError(self.writer.failure, result)

@@ -33,7 +33,6 @@ if TYPE_CHECKING:
     from enumsol.search.parts import Answer
     from enumsol.search.reduction import LoneProposal
     from enumsol.support.array_types import Codes
-    from enumsol.support.deadlines import Limited
 
 
 class Remainder:
@@ -67,7 +66,7 @@ class Remainder:
         self._left.append((codes, KeptRecords(packed=True)))
         self._certifier.recorder = self._left[-1][1]
 
-    def known(self, limits: Limited | None = None) -> Codes | None:
+    def known(self, limits: Deadline | None = None) -> Codes | None:
         """Codes of a selection that holds a root, if one is found within limits, by default in a second."""
         if self._known_root is None:
             return None
@@ -351,7 +350,7 @@ class TreeSearch:
 
     def finish(self) -> None:
         """Leave what was skipped undecided, except for the known root and the selections of continua in it."""
-        with within(Deadline(self.limits.deadline).extended(self._start)):
+        with within(self.limits.extended(self._start)):
             self.rest.finish()
 
     def examine(self, item: TreeNode) -> list[TreeNode]:
