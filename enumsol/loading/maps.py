@@ -22,7 +22,7 @@ from enumsol.model.problem import ContactProblem
 from enumsol.search.outcome import Stop, StopReason
 from enumsol.support import arguments
 from enumsol.support.array_arguments import vector_of
-from enumsol.support.deadlines import keeping
+from enumsol.support.deadlines import Deadline, keeping
 from enumsol.support.immutable import Immutable, Listed
 from enumsol.support.messages import counted
 from enumsol.support.plotting import area_entry, axes_of, checked_units, figure_of, in_units, kept, line_entry
@@ -121,13 +121,13 @@ def multiplicity_map(
         options["without"] = without
     if "interval" in options or "progress" in options:
         raise InvalidArgumentError("interval and progress are not options here; expected those of branch_graph")
-    seconds, started = arguments.optional_seconds(time_limit), time.perf_counter()
+    limits = Deadline.after(time.perf_counter(), arguments.optional_seconds(time_limit))
     done: dict[int, MapRow] = {}
 
     def calls() -> Iterator[Call[int]]:
         """Calls of map_row, while there is time; the options have what is left of it."""
         for place, value in enumerate(values):
-            left = None if seconds is None else seconds - (time.perf_counter() - started)
+            left = limits.remaining()
             if left is not None and left <= 0:
                 return
             own = options if left is None else {**options, "time_limit": max(left, 1e-3)}
