@@ -401,7 +401,7 @@ CHILD = textwrap.dedent("""
     import signal, sys
     from enumsol import enumerate_roots, gallery
     from enumsol.search import nodes as forms
-    forms.NODES = 100
+    forms.FORM_AFTER = 100
     path, at, resume = sys.argv[1], int(sys.argv[2]), sys.argv[3] == "resume"
     def wait(progress):
         if progress.nodes + progress.resumed >= at:
