@@ -80,7 +80,7 @@ _SENTENCES = {
 
 
 class Follower(Generic[_Path]):
-    """One continuation.
+    """State of a continuation.
 
     Parameters
     ----------
