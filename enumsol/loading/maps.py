@@ -35,7 +35,7 @@ if TYPE_CHECKING:
     import pandas as pd
 
     from enumsol.branches.graph import BranchGraph
-    from enumsol.support.array_types import Alpha, AlphaLike
+    from enumsol.support.array_types import Alpha, AlphaLike, Floats
     from enumsol.support.workers import Call
 
 
@@ -343,9 +343,9 @@ def _limit(row: MapRow) -> str:
 # -- the second parameter ----------------------------------------------------------------------------------------------
 
 
-def _replaced(problem: ContactProblem, name: str, direction: Any, value: float) -> ContactProblem:
+def _replaced(problem: ContactProblem, name: str, direction: Floats | None, value: float) -> ContactProblem:
     """The problem with another value of a field (a module-level function, so that other processes can import it)."""
-    if name == "load":
+    if name == "load" and direction is not None:
         return problem.replace(f=problem.f + value * direction)
     return problem.replace(friction=value, friction_slope=0.0) if name == "friction" else problem.replace(gap=value)
 

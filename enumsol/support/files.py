@@ -192,7 +192,7 @@ def reading(place: Path, content: str, writer: str) -> Iterator[None]:
         ) from error
 
 
-def plain_value(value: Any) -> Any:
+def plain_value(value: object) -> Any:
     """Lists of arrays, values of enumerations and texts of fractions, which JSON does not have."""
     if hasattr(value, "tolist"):  # arrays of numpy, which is not imported for --help
         return value.tolist()
