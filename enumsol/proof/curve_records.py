@@ -15,6 +15,7 @@ from enumsol.proof.reading import (
 )
 from enumsol.proof.records import ClosingRecord, Limits, Record, Tree
 from enumsol.trusted.space.curve_runs import LinkRange
+from enumsol.trusted.space.pieces import lies_in
 from enumsol.trusted.space.solution_curve import CurveBox
 
 if TYPE_CHECKING:
@@ -225,10 +226,11 @@ class ThroughCurveBox(ClosingRecord):
         if not a <= low <= narrowed.low <= narrowed.high <= high <= b:
             return False
         whole, (known, number) = piece.over(low, high), boxes[self.box]
-        arc, point = whole.arc(codes), (rational_from(self.alpha), self.leaf)
-        if arc is None or not whole.meets(arc, point, known.problem, known.chain.links[number].curve):
+        arc, (at, root) = whole.arc(codes), whole.root_at(rational_from(self.alpha), self.leaf)
+        if arc is None or root is None or not arc.has(root, self.leaf):
             return False
-        return known.chain.runs_through(low, high)
+        met = lies_in(at.place(root, known.problem), known.chain.links[number].curve)
+        return met and known.chain.runs_through(low, high)
 
 
 def _boxes(entries: list[Any], limits: Limits) -> list[int]:

@@ -364,7 +364,7 @@ class Alone(ClosingRecord):
     def holds(self, system: EnclosedSystem, codes: Codes, errors: float = 1.0, near: Floats | None = None) -> Any:
         """The only solution below the assignment, None where that is not proven (theory, sections 6.13 and 12.6).
 
-        A VerifiedSelection; in 3D a SpaceRoot, or an OnlySolution where no leaf is named, near these normal forces, by
+        A VerifiedSelection; in 3D a SpaceRoot, or a LooseSolution where no leaf is named, near these normal forces, by
         default those of the enclosure. ``errors`` as of Excluded.
         """
         if self.strengths is not None and self.terms is not None:
@@ -372,10 +372,8 @@ class Alone(ClosingRecord):
         from enumsol.trusted.space import space_uniqueness as space  # in 3D only
 
         given = cast("EnclosedSpace", system)
-        if any(code != UNDECIDED for code in codes):
-            return space.lone_root(given, codes, self.numbers, self.selection, errors)
         if self.selection:
-            return space.only_root(given, self.numbers, self.selection, errors)
+            return space.lone_root(given, codes, self.numbers, self.selection, errors)
         if near is None:
             near = self.enclosure.numbers(len(system.g))[0][: len(codes)]
         return space.only_solution_in_space(given, self.numbers, near, errors)

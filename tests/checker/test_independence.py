@@ -50,7 +50,7 @@ SHARED = {
     "condensation.enclosure": {
         *("CondensedEnclosure", "EnclosedSystem", "NotEnclosedError", "RigidRows", "enclosure_of", "moved_by_modes")
     },
-    "condensation.space_condensed": {"AlphaSpace", "EnclosedSpace", "PieceSpace", "SpaceSystem"},
+    "condensation.space_condensed": {"AlphaSpace", "EnclosedSpace", "SpaceSystem"},
     "condensation.unloaded": {"never_loaded", "solved", "vanishing_alpha"},
     "trusted.arcs.only_branch": {"branch_references", "only_roots"},
     "trusted.arcs.selection_balls": None,
@@ -84,7 +84,7 @@ SHARED = {
     "trusted.space.sector_rows": None,
     "trusted.space.leaf_equations": {"with_free_bounds"},
     "trusted.space.leaves": None,
-    "trusted.space.force_bound": {"resultants", "unbounded"},
+    "trusted.space.force_bound": {"unbounded"},
     "trusted.space.turning": {"turned_by"},
     "trusted.space.boxed_solution": {
         *("Box", "BoxedSolution", "BoxProblem", "apart_in_boxes", "is_inside", "solution_in_box")
@@ -97,7 +97,7 @@ SHARED = {
     },
     "trusted.space.pieces": {"AlphaPiece", "LeafArc", "lie_along"},
     "trusted.space.space_uniqueness": {
-        *("LeafReference", "LooseSolution", "OnlySolution", "PieceWeights"),
+        *("LeafReference", "LooseSolution", "PieceWeights"),
         *("equations", "how_far_off", "moderate_units"),
     },
     "proof.begun": None,

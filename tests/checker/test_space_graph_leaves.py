@@ -11,7 +11,7 @@ from proof_tools import of_kind, proof_of, put, records_of, replaced, why_refuse
 from enumsol import verify
 from enumsol.branches.space.space_graph import ByCurves
 from enumsol.gallery import wedge3d
-from enumsol.search.space.piece_certificates import PieceProposals
+from enumsol.search.space.piece_proposals import ExaminedPiece
 
 INTERVAL = Fraction(0), Fraction(1)
 #: Of a wedge, with a leaf that only its equations show to be without a root.
@@ -26,8 +26,8 @@ def leaf_by_leaf(p, seed):
     """
     cover = ByCurves(random_over_alpha(p, seed), INTERVAL) if p else ByCurves(wedge3d(2, 1, 2), WEDGED)
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(PieceProposals, "numbers", lambda *_: None)
-        patch.setattr(PieceProposals, "is_hopeful", lambda *_: False)
+        patch.setattr(ExaminedPiece, "numbers", lambda *_: None)
+        patch.setattr(ExaminedPiece, "is_hopeful", lambda *_: False)
         cover.search(max_nodes=100)
     return cover.problem, records_of(cover.proof())
 

@@ -126,7 +126,7 @@ def test_roots_on_an_arc_are_on_one_curve(p, seed):
             alpha = piece.low + (piece.high - piece.low) * k / 8
             for root in enumsol.enumerate_roots(problem, alpha):
                 narrow = leaf_of(root, problem, 14, NoTurn())
-                there = piece.point_at(alpha).held(narrow)
+                there = piece.over(alpha, alpha).held(narrow)
                 if isinstance(there, SpaceRoot) and arc.has(there, narrow):
                     on_it.append(root)
         if len(on_it) < 2:

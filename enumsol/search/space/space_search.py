@@ -39,10 +39,10 @@ from enumsol.search.certifiers.protocol import WIDEN, Bound, Certifier, Refine, 
 from enumsol.search.outcome import HOLD
 from enumsol.search.space.open_leaves import Cause, KnownBoxes, obstacle, sector_to_halve
 from enumsol.trusted.floating_bounds import motion_beside
-from enumsol.trusted.space.force_bound import resultants, unbounded
+from enumsol.trusted.space.force_bound import unbounded
 from enumsol.trusted.space.leaves import Open, SpaceRoot, settle
-from enumsol.trusted.space.sector_rows import is_sector_covering, is_within
-from enumsol.trusted.space.space_uniqueness import LeafReference, OnlySolution
+from enumsol.trusted.space.sector_rows import FRICTIONLESS, OPEN, is_sector_covering, is_within
+from enumsol.trusted.space.space_uniqueness import LeafReference
 from enumsol.trusted.space.turning import turned_by
 
 if TYPE_CHECKING:
@@ -53,13 +53,9 @@ if TYPE_CHECKING:
     from enumsol.search.reference_closer import OnlyRoot
     from enumsol.support.array_types import Codes, Floats
     from enumsol.trusted.space.boxed_solution import BoxedSolution
+    from enumsol.trusted.space.pieces import AlphaPiece
     from enumsol.trusted.space.sector_rows import Row
     from enumsol.trusted.space.space_uniqueness import LooseSolution
-
-
-#: Enclosures of solutions in boxes are made in steps of four.
-_WIDER = 4.0 * WIDEN
-_PERTURB, _HOLD = "perturb the load, by 1e-4 of its largest entry, say", "hold the body by stiffer springs"
 
 
 class SpaceSplitting:
@@ -85,7 +81,9 @@ class SpaceSplitting:
             return children[:: -1 if force > -w else 1]
         if codes[node] == CONTACT and self._engine.tangents[node] == 1:
             return children
-        tau, v = self._system.taus(relaxation.forces)[node], self._system.slips(relaxation.displacements)[node]
+        system = self._system
+        tau = system.tangential(relaxation.forces)[node] * system.tau_scale[node]
+        v = system.slips(relaxation.displacements)[node]
         towards = tau / (np.linalg.norm(tau) + 1e-300) + v / (np.linalg.norm(v) + 1e-300)
         return sorted(children, key=lambda code: -_towards(code, towards) if code > SECTORS else -10.0)
 
@@ -167,8 +165,8 @@ class SpaceExclusions:
             return excluded, False
         if self.system.held:
             return None
-        if (unbalanced := self.unbalanced(codes)) is not None:
-            return unbalanced, False
+        if (without := self.unbalanced(codes)) is not None:
+            return without, False
         told = not any(code in (UNDECIDED, CONTACT) for code in codes)
         if (within or told) and len(rows) and excluded.holds(self.system, codes, 2.0):
             if told and settle(self.free, codes) is None:
@@ -178,10 +176,45 @@ class SpaceExclusions:
 
     def unbalanced(self, codes: Codes) -> Unbalanced | None:
         """A record that no forces below a partial assignment are in balance with the load; or None."""
-        if self.system.held:
-            return None
-        record = Unbalanced(motion_beside(self.system, resultants(self.system, codes)))
-        return record if record.holds(self.system, codes) else None
+        return unbalanced(self.system, [self.system], codes)
+
+
+#: A disc of forces lies in a polygon of so many corners.
+_CORNERS = 16
+
+
+def unbalanced(within: EnclosedSpace | AlphaPiece, ends: Sequence[EnclosedSpace], codes: Codes) -> Unbalanced | None:
+    """A record that no forces below an assignment are in balance with the load, by the data at some alphas; or None."""
+    records = (Unbalanced(motion_beside(end, resultants(end, codes))) for end in ends if not end.held)
+    return next((record for record in records if record.holds(within, codes)), None)
+
+
+def resultants(system: EnclosedSpace, codes: Sequence[int]) -> list[Floats]:
+    """Resultants G y, (r,) each, whose cone holds all that the forces of an assignment can have, but for rounding."""
+    G, discs = system.rows.G.mid / system.unit, system.discs.mid.tolist()
+    found = []
+    for i, code in enumerate(codes):
+        if code == OPEN:
+            continue
+        places = [int(t) for t in system.tau[i] if t >= 0]
+        found += [
+            G[:, i] + discs[i] * sum((x * G[:, t] for x, t in zip(tau, places, strict=True)), 0.0 * G[:, i])
+            for tau in _corners(code, len(places))
+        ]
+    return found
+
+
+def _corners(code: int, tangents: int) -> list[tuple[float, ...]]:
+    """Corners of a polygon around the tau of a node, |tau| <= 1."""
+    if code == FRICTIONLESS or not tangents:
+        return [(0.0,) * tangents]
+    if tangents == 1:
+        return [(sign,) for sign in (1.0, -1.0) if code != (SLIP_MINUS if sign > 0 else SLIP_PLUS)]
+    if code > SECTORS:
+        a, b = (np.array(direction(n)) for n in (code - SECTORS, end_number(code - SECTORS)))
+        return [tuple(corner) for corner in (a, b, (a + b) / (1.0 + a @ b))]
+    angles = 2.0 * np.pi * np.arange(_CORNERS) / _CORNERS
+    return list(zip(*(np.array([np.cos(angles), np.sin(angles)]) / np.cos(np.pi / _CORNERS)).tolist(), strict=True))
 
 
 class SpaceCertifier(Certifier):
@@ -240,8 +273,8 @@ class SpaceCertifier(Certifier):
 
     def selection(self, codes: Codes) -> SpaceRoot | BoxedSolution | UndecidedPart | Refine | None:
         """The root of a leaf, a sector to halve, or why the leaf stays open."""
-        if (unbalanced := self._exclusions.unbalanced(codes)) is not None:
-            self._leaf(unbalanced)
+        if (without := self._exclusions.unbalanced(codes)) is not None:
+            self._leaf(without)
             return None
         answer = self._settled(codes)
         if not self.enclosed.held and (answer is None or isinstance(answer, SpaceRoot)):
@@ -264,7 +297,8 @@ class SpaceCertifier(Certifier):
             cause, mode = obstacle(answer)
             reason = cause.value if mode is None else f"{cause.value} (rigid mode {mode})"
             self._leaf(UndecidedRecord(reason))
-            hint = {Cause.ROUNDING: _HOLD, Cause.RIGID: HOLD}.get(cause, _PERTURB)
+            hints = {Cause.ROUNDING: "hold the body by stiffer springs", Cause.RIGID: HOLD}
+            hint = hints.get(cause, "perturb the load, by 1e-4 of its largest entry, say")
             return UndecidedPart(codes, reason, hint, examined=True)
         else:
             self._leaf(RegularRoot(self._ball(answer)))
@@ -275,7 +309,8 @@ class SpaceCertifier(Certifier):
         """The solution of a box, and its leaf written."""
         self._verified[codes], unit = found, self.enclosed.unit
         centre, radius, rho = found.box.numbers
-        self._leaf(BoxedRoot(centre * unit, radius * unit, rho * unit**2, self._ball(found, wider=_WIDER)))
+        # enclosures of solutions in boxes are made in steps of four
+        self._leaf(BoxedRoot(centre * unit, radius * unit, rho * unit**2, self._ball(found, wider=4.0 * WIDEN)))
         return found
 
     def _placed(self, codes: Codes, root: SpaceRoot) -> SpaceRoot:
@@ -291,7 +326,7 @@ class SpaceCertifier(Certifier):
         again = settle(self.enclosed, tuple(there)) if turning else None
         return again if isinstance(again, SpaceRoot) else root
 
-    def close(self, numbers: Floats, codes: Codes | None, normal: Floats) -> list[SpaceRoot | OnlySolution] | None:
+    def close(self, numbers: Floats, codes: Codes | None, normal: Floats) -> list[SpaceRoot | LooseSolution] | None:
         """The only solution of the whole problem, as a list, and its leaf written; None if that is not proven.
 
         Parameters
@@ -300,7 +335,7 @@ class SpaceCertifier(Certifier):
         codes : of a leaf that holds the solution; None: its statuses need not hold strictly
         normal : (p,) array, lambda_n near the solution
         """
-        found: SpaceRoot | OnlySolution | None
+        found: SpaceRoot | LooseSolution | None
         record = Alone(codes or (), numbers, NOWHERE)
         try:
             found = record.holds(self.enclosed, self._whole, errors=2.0, near=normal)
