@@ -18,7 +18,7 @@ from enumsol.checker.reports import StabilityVerificationReport
 from enumsol.checker.walk import ProofChecker
 from enumsol.condensation.enclosure import enclosure_of
 from enumsol.errors import InvalidArgumentError, InvalidProblemError
-from enumsol.model.mass import checked_mass, mass_fingerprint
+from enumsol.model.mesh import checked_mass, mass_fingerprint
 from enumsol.proof.reading import RefusedError, check_header, quoted, same
 from enumsol.proof.stability_records import (
     DOES_NOT,

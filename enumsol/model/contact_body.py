@@ -14,11 +14,10 @@ import scipy.sparse as sp
 
 from enumsol.condensation.data import exactly_at
 from enumsol.errors import EnumsolError, InvalidArgumentError, InvalidProblemError, NotHeldError
-from enumsol.model.mass import checked_mass
-from enumsol.model.mesh import BodyMesh
+from enumsol.model.mesh import ASYMMETRY_TOLERANCE, BodyMesh, checked_mass
 from enumsol.model.rigid_modes import RigidModes, largest_displacement
 from enumsol.support.arguments import alpha_value, instance_of, shown
-from enumsol.support.array_arguments import real_array, real_matrix
+from enumsol.support.array_arguments import array_of, real_array, real_matrix
 from enumsol.support.immutable import Immutable, SealedMatrix, sealed
 from enumsol.support.messages import counted
 
@@ -31,8 +30,6 @@ if TYPE_CHECKING:
     from enumsol.condensation.products import Products
     from enumsol.support.array_types import AlphaLike, ArrayLike, Floats, Indices
 
-#: An asymmetry of A up to this fraction of max|A| is rounding of the user's assembly and is averaged away.
-ASYMMETRY_TOLERANCE = 1e-12
 #: Singular values of the row-normalised contact rows below this fraction of the largest mean dependent rows.
 ROW_RANK_TOLERANCE = 1e-12
 
@@ -100,7 +97,7 @@ class ContactBody(Immutable):
         self.gap = vector(gap, "gap", p, broadcast=True)
         self.load_slope = None if load_slope is None else vector(load_slope, "load_slope", n)
         self.node_ids = _node_ids(node_ids, p)
-        self.coordinates = None if coordinates is None else _coordinates(coordinates, p, len(rows))
+        self.coordinates = None if coordinates is None else sealed(_places(coordinates, p, len(rows)))
 
     @property
     def A(self) -> sp.csc_array:  # noqa: N802 (the field's letter)
@@ -576,10 +573,6 @@ def _node_ids(value: Iterable[object] | None, p: int) -> tuple[Any, ...]:
     return ids
 
 
-def _coordinates(value: ArrayLike, p: int, dimension: int) -> Floats:
-    array = real_array(value, "coordinates")
-    if array.shape != (p, dimension):
-        raise InvalidProblemError(
-            f"coordinates has shape {array.shape}; expected (p, {dimension}) = ({p}, {dimension})"
-        )
-    return sealed(array)
+def _places(value: ArrayLike, p: int, dimension: int) -> Floats:
+    expected = f"(p, {dimension}) = ({p}, {dimension})"
+    return array_of(value, "coordinates", (p, dimension), expected, InvalidProblemError)

@@ -259,7 +259,7 @@ def enumerate_roots(
     if _is_in_space(problem):
         # not for problems in 2D
         from enumsol.roots.space_roots import SpaceEnumeration, check_supported
-        from enumsol.search.space.space_setup import SpaceSolvers
+        from enumsol.search.space.space_search import SpaceSolvers
 
         check_supported(arithmetic, method, engine)
     _check_proof(arithmetic, method, proof_path, resume)

@@ -31,7 +31,7 @@ from enumsol.roots.local_branch import SelectionTangent
 from enumsol.roots.root import Enclosure, Root
 from enumsol.roots.root_set import RootSet, Undecided
 from enumsol.search.space.open_leaves import Cause
-from enumsol.search.space.space_setup import SpaceSolvers
+from enumsol.search.space.space_search import SpaceSolvers
 from enumsol.support.deadlines import over, tell
 from enumsol.support.immutable import sealed
 from enumsol.trusted.space.boxed_solution import BoxedSolution, apart_in_boxes

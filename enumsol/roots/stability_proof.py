@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from enumsol.errors import InvalidArgumentError
-from enumsol.model.mass import mass_fingerprint
+from enumsol.model.mesh import mass_fingerprint
 from enumsol.model.statuses import ContactStatus
 from enumsol.proof.proof_file import PROOF_VERSION
 from enumsol.proof.stability_records import DOES_NOT, RUNS_AWAY, UNDECIDED, VERDICTS, certificate_record, root_record

@@ -20,7 +20,7 @@ from enumsol.condensation.data import exactly_at
 from enumsol.condensation.dynamic import DynamicStiffness
 from enumsol.condensation.enclosure import NotEnclosedError, nearest_floats
 from enumsol.errors import InvalidArgumentError
-from enumsol.model.mass import checked_mass
+from enumsol.model.mesh import checked_mass
 from enumsol.support.arguments import alpha_value
 from enumsol.trusted.running_away import Motions, Touching
 from enumsol.trusted.status_rows import OPEN, SLIP_PLUS, STICK

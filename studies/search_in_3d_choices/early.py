@@ -17,8 +17,7 @@ from enumsol.relaxation.space_relaxation import SpaceEngine, SpaceRelaxation
 from enumsol.search.nodes import Relaxations
 from enumsol.search.outcome import SearchLimits
 from enumsol.search.space import space_search as space
-from enumsol.search.space.space_search import SpaceSplitting
-from enumsol.search.space.space_setup import SpaceSolvers
+from enumsol.search.space.space_search import SpaceSolvers, SpaceSplitting
 from enumsol.search.tree import TreeSearch
 from enumsol.trusted.space.leaves import Open, SpaceRoot, distinct_roots, settle
 

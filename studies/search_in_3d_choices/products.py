@@ -26,8 +26,7 @@ from enumsol.search.nodes import Relaxations
 from enumsol.search.outcome import SearchLimits
 from enumsol.search.space.space_fathoming import Point
 from enumsol.search.space.space_newton import Isotropic
-from enumsol.search.space.space_search import SpaceCertifier, SpaceSplitting
-from enumsol.search.space.space_setup import SpaceSolvers
+from enumsol.search.space.space_search import SpaceCertifier, SpaceSolvers, SpaceSplitting
 from enumsol.search.splitting import ImposedRows
 from enumsol.search.tree import TreeSearch
 from enumsol.trusted.space.leaves import distinct_roots

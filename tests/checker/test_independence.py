@@ -174,7 +174,7 @@ def test_no_module_of_the_search_is_imported_however_indirectly():
 
 
 def test_the_guard_sees_the_search_where_it_is():
-    users = (["enumsol.branches.construction"], ["enumsol.gallery", "enumsol.cli.audit", "enumsol.roots.root_set"])
+    users = (["enumsol.branches.construction"], ["enumsol.gallery", "enumsol.cli.graph", "enumsol.roots.root_set"])
     assert all(any(map(is_search, closure_of(modules))) for modules in users)
     assert all(map(path_of, SEARCH))
 
@@ -271,9 +271,9 @@ def test_a_proof_in_space_loads_no_more_than_the_checker(tmp_path):
 
 
 def test_the_claims_point_at_the_one_place():
-    from enumsol.cli import audit
+    from enumsol.cli import graph
 
     readme = ROOT.parent / "README.md"
-    for text in (audit.verify.__doc__, *([readme.read_text()] if readme.is_file() else [])):
+    for text in (graph.verify.__doc__, *([readme.read_text()] if readme.is_file() else [])):
         assert "shares no code" not in text
         assert "enumsol.checker" in text

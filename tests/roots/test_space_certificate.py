@@ -25,7 +25,7 @@ from trees import by_the_tree
 from enumsol import ContactStatus, enumerate_roots, gallery, verify
 from enumsol.model.statuses import UNDECIDED
 from enumsol.search.space.space_fathoming import SpaceCloser
-from enumsol.search.space.space_setup import SpaceSolvers
+from enumsol.search.space.space_search import SpaceSolvers
 from enumsol.trusted.space.space_uniqueness import is_complete, lone_root, only_solution_in_space
 
 

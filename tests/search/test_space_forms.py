@@ -26,7 +26,7 @@ from trees import by_the_tree, forms_at_once
 from enumsol import enumerate_roots, fem, verify
 from enumsol.arithmetic.balls import SAFE
 from enumsol.checker.space_checker import SpaceChecker
-from enumsol.search.space.space_setup import SpaceSolvers
+from enumsol.search.space.space_search import SpaceSolvers
 from enumsol.trusted.space.sector_margins import SlipForm
 
 

@@ -21,7 +21,7 @@ from space_proofs import RANDOM, random_problem
 from enumsol import enumerate_roots
 from enumsol.arithmetic.balls import Ball
 from enumsol.search.space.open_leaves import box_around, proposed_rho
-from enumsol.search.space.space_setup import SpaceSolvers
+from enumsol.search.space.space_search import SpaceSolvers
 from enumsol.trusted.space.boxed_solution import (
     Box,
     BoxedSolution,

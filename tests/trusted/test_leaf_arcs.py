@@ -12,7 +12,7 @@ from enumsol.branches.space.chains import chain_through
 from enumsol.condensation.space_condensed import AlphaSpace
 from enumsol.model.sectors import DEEPEST, SECTORS, places
 from enumsol.search.space.curve_proposals import placed
-from enumsol.search.space.space_setup import SpaceSolvers
+from enumsol.search.space.space_search import SpaceSolvers
 from enumsol.trusted.space.leaves import SpaceRoot
 from enumsol.trusted.space.pieces import AlphaPiece
 from enumsol.trusted.space.solution_curve import AlphaProblem

@@ -15,7 +15,7 @@ from enumsol.condensation.space_condensed import AlphaSpace, EnclosedSpace, Piec
 from enumsol.model.sectors import SECTORS, nearest, start_of
 from enumsol.search.space.curve_proposals import placed
 from enumsol.search.space.piece_proposals import PieceBounds
-from enumsol.search.space.space_setup import SpaceSolvers
+from enumsol.search.space.space_search import SpaceSolvers
 from enumsol.trusted.space.leaf_equations import Leaf, slopes_by_second
 from enumsol.trusted.space.leaves import Open, SpaceRoot
 from enumsol.trusted.space.pieces import AlphaPiece, lie_along

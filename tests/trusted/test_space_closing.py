@@ -11,7 +11,7 @@ from problems3d import from_compliance, random_compliance
 from enumsol.model.statuses import UNDECIDED
 from enumsol.search.space.space_fathoming import SpaceCloser
 from enumsol.search.space.space_newton import Isotropic
-from enumsol.search.space.space_setup import SpaceSolvers
+from enumsol.search.space.space_search import SpaceSolvers
 from enumsol.trusted.space.leaves import SpaceRoot
 from enumsol.trusted.space.space_uniqueness import (
     LARGEST_UNIT,

@@ -28,7 +28,7 @@ from enumsol.roots.space_roots import SpaceEnumeration
 from enumsol.search.outcome import Stop, StopReason
 from enumsol.search.space.known_curves import Curves, joined
 from enumsol.search.space.piece_tree import OpenLeaf, PieceTree, SpreadPieces
-from enumsol.search.space.space_setup import SpaceSolvers
+from enumsol.search.space.space_search import SpaceSolvers
 from enumsol.support.deadlines import TimeOverError, look, remaining, within
 from enumsol.support.messages import counted
 from enumsol.trusted.space.curve_parts import Run, arcs_over
