@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from enumsol.roots.stability import Stabilities, rate_bounds
-from enumsol.search.growing_motions import GrowingMotions
+from enumsol.search.growing_motions import crossing_near, zero_near
 from enumsol.search.stability import Proven, StabilitySearch
 from enumsol.support.deadlines import look
 from enumsol.trusted.motions_of_body import friction_over
@@ -173,10 +173,10 @@ def _extended(proven: Proven, setting: Setting) -> bool | tuple[float, float]:
     """A proof at one alpha, if it holds for a range of them."""
     stiffness, motions = setting.stiffness, setting.motions
     for tried, _ in proven.growing:
-        crossing = GrowingMotions(stiffness, motions).crossing_near(tried)
+        crossing = crossing_near(stiffness, motions, tried)
         if crossing is not None:
             return rate_bounds(crossing.low, crossing.high)
-        at = GrowingMotions(stiffness, motions).zero_near(tried)
+        at = zero_near(stiffness, motions, tried)
         if at is None:
             continue
         # between such powers of two motions are looked for, so that K(mu) is enclosed at few mu

@@ -42,8 +42,7 @@ class BoxSelection:
         """The selection in many digits."""
         from enumsol.trusted.arcs.precise import PreciseSelection  # python-flint, not for all proofs
 
-        system = self._owner.precise_system
-        system = system.constant_load(float(self._side)) if self._side else system
+        system = self._owner.precise_system.beside_zero(float(self._side))
         return PreciseSelection(system, self.plain.rows.codes)
 
     @property

@@ -33,6 +33,7 @@ from enumsol.trusted.status_rows import FRICTIONLESS, OPEN, SLIP_MINUS, SLIP_PLU
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Mapping, Sequence
 
+    from enumsol.arithmetic.balls import Ball
     from enumsol.condensation.enclosure import CondensedEnclosure
     from enumsol.model.problem import ContactProblem
     from enumsol.support.array_types import Codes
@@ -125,7 +126,9 @@ class PieceOnArcs:
             raise ValueError("a number mu or kappa is not positive, or the factor of the balance negative")
         return cls(a, b, numbers)
 
-    def failure(self, arcs: Sequence[ClaimedArc], systems: dict[int, ArcSystem], origin: Fraction | None) -> str | None:
+    def failure(
+        self, arcs: Sequence[ClaimedArc], systems: dict[int, ArcSystem[Ball]], origin: Fraction | None
+    ) -> str | None:
         """Why the arcs are not shown to hold all its solutions, or None. Events have their partners."""
         side = 0 if origin is None else 1 if self.b > origin else -1
         chain = self._chain([arc for arc in arcs if arc.side == side])
@@ -140,7 +143,7 @@ class PieceOnArcs:
         proven = all(only_roots(spans, self.numbers)) if not len(system.reach) else self._covered(spans, system)
         return None if proven else "its arcs are not proven to hold all its solutions"
 
-    def _covered(self, spans: Sequence[tuple[ArcSelection, float, float]], system: ArcSystem) -> bool:
+    def _covered(self, spans: Sequence[tuple[ArcSelection, float, float]], system: ArcSystem[Ball]) -> bool:
         """True if every leaf is proven to hold nothing beside the arcs (theory, section 14.16)."""
         ends = _below(self.a), -_below(-self.b)
         known, free = branch_references(spans, self.numbers), without_bound(system.at(*ends)).reach
@@ -233,7 +236,7 @@ class ArcChecker:
         self._problem, self._enclosure, self._interval, self._origin = problem, enclosure, interval, origin
         self._fail = fail
         self._due = {(codes, *span) for codes, where in pieces.items() for span in self._spans(where)}
-        self._systems: dict[int, ArcSystem] = {}
+        self._systems: dict[int, ArcSystem[Ball]] = {}
         self._closed = closed
         self.events: list[ClaimedEvent] = []
         self.arcs: list[ClaimedArc] = []
@@ -252,8 +255,8 @@ class ArcChecker:
         except ValueError as error:
             raise RefusedError(f"the arcs cannot be read: {error}") from None
         sides = (0,) if self._origin is None else (-1, 1)
-        given = self._problem, self._enclosure
-        self._systems = {side: ArcSystem.of(*given, *units, float(side)) for side in sides}
+        system = ArcSystem.of(self._problem, self._enclosure, *units)
+        self._systems = {side: system.beside_zero(float(side)) for side in sides}
         record, due = next(records, _END), len(self._due)
         while isinstance(record, list):
             tell("selections followed", min(self.traces, due), due)
@@ -359,12 +362,14 @@ class ArcChecker:
     @cached_property
     def precise_system(self) -> Any:
         """The problem in many digits."""
-        from enumsol.trusted.arcs.many_digits import affordable
-        from enumsol.trusted.arcs.precise import PreciseSystem  # python-flint, not for all proofs
+        from enumsol.trusted.arcs.precise import (
+            affordable,
+            system_in_many_digits,  # python-flint, not for all proofs
+        )
 
         if not affordable(self._problem):
             raise ValueError("a box in many digits belongs to a problem that is too large for it")
-        system = PreciseSystem.of(self._problem)
+        system = system_in_many_digits(self._problem)
         if system is None:
             raise ValueError("A is positive definite only within rounding")
         return system

@@ -33,13 +33,12 @@ from enumsol.trusted.status_rows import (
 from enumsol.trusted.uniqueness import ClosedSolution, same_solution
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Callable, Sequence
 
     from enumsol.checker.rational import Hull, RationalBody, RationalSystem
     from enumsol.checker.walk import Test
     from enumsol.proof.records import EnclosureRecord, Record
     from enumsol.support.array_types import Codes, Mask
-    from enumsol.trusted.arcs.precise import PreciseAtAlpha
     from enumsol.trusted.at_alpha import Unsettled
     from enumsol.trusted.positions import Among
 
@@ -192,19 +191,19 @@ class Checker(TreeChecker[EnclosedSystem, "VerifiedSelection | ClosedSolution | 
         return settled_selection(system, codes, self._in_many_digits)
 
     def _in_many_digits(self, codes: Codes) -> VerifiedSelection | None:
-        return None if self._precise is None else self._precise.solve(codes)
+        return None if self._precise is None else self._precise(codes)
 
     def _is_root(self, found: object) -> bool:
         return isinstance(found, VerifiedSelection)
 
     @cached_property
-    def _precise(self) -> PreciseAtAlpha | None:
-        """The problem in many digits; None where that is not to be had, or the proof is about S and g as computed."""
+    def _precise(self) -> Callable[[Codes], VerifiedSelection | None] | None:
+        """Solutions in many digits; None where these are not to be had, or the proof is about S and g as computed."""
         if self.data == "condensed" or not self.problem.held:
             return None
-        from enumsol.trusted.arcs.precise import PreciseAtAlpha  # python-flint, not always needed
+        from enumsol.trusted.arcs.precise import verified_in_many_digits  # python-flint, not always needed
 
-        return PreciseAtAlpha.of(self.problem, self.alpha, self.force, self.length)
+        return verified_in_many_digits(self.problem, self.alpha, self.force, self.length)
 
     def _no_root(self, codes: Codes, said: kinds.NoRoot) -> str | None:
         if said.by != kinds.RATIONAL:

@@ -237,12 +237,10 @@ class StabilityChecker(ProofChecker):
         if part is None or not isinstance(growing, Growing):
             self.fail(f"root {said.number} is said to run away without one motion that grows")
             return UNDECIDED, None
-        found = growing.found(part.stiffness, part.motions)
-        if found is None:
+        if growing.found(part.stiffness, part.motions) is None:
             self.fail(f"root {said.number}: no motion is proven to grow in the range that is named")
             return UNDECIDED, None
-        low, high = found.mu
-        return RUNS_AWAY, (math.sqrt(low) * _BELOW, math.sqrt(high) * _ABOVE)
+        return RUNS_AWAY, (math.sqrt(growing.low) * _BELOW, math.sqrt(growing.high) * _ABOVE)
 
     def _statuses(self, leaf: Located) -> tuple[list[int], Floats | None] | None:
         """Statuses that hold strictly, and in 3D bounds of lambda_t; None where they are not certain."""

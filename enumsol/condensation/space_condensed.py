@@ -12,14 +12,14 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from enumsol.arithmetic.balls import SAFE, TINY, UNIT, Ball, gamma, upper_norm
+from enumsol.arithmetic.balls import SAFE, TINY, UNIT, Ball, gamma, nearest, upper_norm
 from enumsol.condensation.condensed import LARGEST_FRICTION, cholesky_factor, load_unit, node_units
 from enumsol.condensation.data import exactly_at
-from enumsol.condensation.enclosure import EnclosedSystem, NotEnclosedError, RigidRows, nearest_floats
+from enumsol.condensation.enclosure import EnclosedSystem, NotEnclosedError, RigidRows, coefficients, of_compliance
 from enumsol.errors import InvalidProblemError
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Sequence
+    from collections.abc import Iterator
 
     from enumsol.condensation.data import ProblemData
     from enumsol.condensation.enclosure import CondensedEnclosure
@@ -209,8 +209,6 @@ class EnclosedSpace(EnclosedSystem, FrictionUnits):
         Radii of the discs of tau over lambda_n, by default one; of an AlphaSpace F(alpha) over F.
     turn : PieceTurn or None
         Change of g and discs along a piece of alpha; None at one alpha.
-    fixed : EnclosedSpace or None
-        With the same S: what follows from that alone is computed once (see AlphaSpace).
     """
 
     tangents = 2
@@ -219,7 +217,6 @@ class EnclosedSpace(EnclosedSystem, FrictionUnits):
     unit: Floats
     discs: Ball = field(kw_only=True, default_factory=lambda: _ONES)
     turn: PieceTurn | None = field(kw_only=True, default=None)
-    fixed: EnclosedSpace | None = field(kw_only=True, default=None)
 
     def __post_init__(self) -> None:
         super().__post_init__()
@@ -272,35 +269,14 @@ class EnclosedSpace(EnclosedSystem, FrictionUnits):
             found[has] = self.F[has, k] / self.unit[self.tau[has, k]]
         return found
 
-    # -- what follows from S alone ---------------------------------------------------------------------------------
-
-    @cached_property
-    def inverse(self) -> Floats:
-        """Approximate inverse of S; no claim rests on its accuracy."""
-        return super().inverse if self.fixed is None else self.fixed.inverse
-
-    @cached_property
-    def smallest_eigenvalue(self) -> float:
-        """Proven lower bound on the smallest eigenvalue of every S in the enclosure (see EnclosedSystem)."""
-        return super().smallest_eigenvalue if self.fixed is None else self.fixed.smallest_eigenvalue
-
-    @cached_property
-    def form_error(self) -> float:
-        """By how much a computed x'S x may be off, as a factor of |x|^2."""
-        return super().form_error if self.fixed is None else self.fixed.form_error
-
-    @cached_property
+    @of_compliance
     def largest_norm(self) -> float:
         """Upper bound on the norm of every S in the enclosure."""
-        if self.fixed is not None:
-            return self.fixed.largest_norm
         return float(upper_norm(self.S) + upper_norm(self.S_rad)) * SAFE
 
-    @cached_property
+    @of_compliance
     def product_error(self) -> Floats:
         """By how much a computed S y, with the terms of a sum that it is part of, may be off, as a factor of |y|."""
-        if self.fixed is not None:
-            return self.fixed.product_error
         return np.asarray((gamma(len(self.g) + 4) * np.abs(self.S) + self.S_rad) * SAFE)
 
     @classmethod
@@ -319,9 +295,9 @@ class EnclosedSpace(EnclosedSystem, FrictionUnits):
             Something over- or underflows.
         """
         pairs = zip(*(part.T for part in enclosure.problem.affine_friction), strict=True)
-        exact = [exactly_at(alpha, *pair) for pair in pairs]
-        F, inexact = (np.array(part).T for part in zip(*map(nearest_floats, exact), strict=True))
-        return _enclosed(enclosure, alpha, (force, length), _variables(F, np.where(inexact, 2 * UNIT * F, 0.0)))
+        axes = [coefficients(exactly_at(alpha, *pair)) for pair in pairs]
+        F, F_rad = (np.stack(part, axis=1) for part in zip(*((F.mid, F.rad) for F in axes), strict=True))
+        return _enclosed(enclosure, alpha, (force, length), _variables(F, F_rad))
 
 
 @dataclass(frozen=True, eq=False)
@@ -357,11 +333,6 @@ class AlphaSpace:
     def _variables(self) -> _Variables:
         return _variables(*self._friction)
 
-    @property
-    def _rows(self) -> tuple[Ball, Indices]:
-        """By what the rows that y takes are multiplied, and where they are among 3p."""
-        return self._variables[:2]
-
     @cached_property
     def fixed(self) -> EnclosedSpace:
         """S, F and the places of tau, which do not depend on alpha, with g at ``reference``."""
@@ -386,7 +357,7 @@ class AlphaSpace:
 
     def discs(self, alpha: Fraction, change: Fraction = Fraction(1)) -> Ball:
         """Coefficients at alpha over F, (p,)."""
-        return _nearest([change * value + alpha * slope for value, slope in self._quotients])
+        return nearest([change * value + alpha * slope for value, slope in self._quotients])
 
     def at(self, alpha: Fraction) -> EnclosedSpace:
         """The data at a point, the last of which are kept."""
@@ -414,22 +385,22 @@ class AlphaSpace:
             if min(ends) < 0 or (not any(by) and max(ends) > 0):
                 raise NotEnclosedError("a coefficient of friction is negative, or begins to be positive, over a piece")
         middle, half = (low + high) / 2, (high - low) / 2
-        (weight, rows), length, held = self._rows, np.tile(self.units[1], 3), self.fixed
+        (weight, rows), length, held = self._variables[:2], np.tile(self.units[1], 3), self.fixed
         g, g_rad = self.enclosure.load_in_units(middle, length)
-        disc, disc_turn = self.discs(middle), self.discs(half, Fraction(0))
+        disc, disc_turn, step = self.discs(middle), self.discs(half, Fraction(0)), nearest([half])[0]
         with np.errstate(over="ignore", invalid="ignore"):
             whole = load = weight * Ball(g, g_rad)[rows]
             along = None
             if half:
                 turn = Ball(self.enclosure.g1 / length, self.enclosure.g1_rad / length * SAFE + TINY)[rows]
-                turn = weight * (turn * Ball(np.array(float(half)), np.array(2 * UNIT * float(half))))
+                turn = weight * (turn * step)
                 whole = Ball(load.mid, (load.rad + turn.size) * SAFE)
                 along = PieceTurn(load, turn, disc, disc_turn)
         if not whole.finite:
             raise NotEnclosedError(_OVERFLOW)
         rigid = self._rigid(middle)
         if along is not None:
-            turn = rigid.slope * Ball(np.array(float(half)), np.array(2 * UNIT * float(half)))
+            turn = rigid.slope * step
             turn = Ball(turn.mid, np.where(rigid.slope.size > 0, turn.rad, 0.0))
             along = replace(along, g=Ball.joined(along.g, rigid.h), g_turn=Ball.joined(along.g_turn, turn))
             rigid = replace(rigid, h=Ball(rigid.h.mid, (rigid.h.rad + turn.size) * SAFE))
@@ -447,7 +418,7 @@ class AlphaSpace:
         """Equilibrium of the body as a whole at alpha, on (lambda_n, tau)."""
         force, length = self.units
         rows = RigidRows.of(self.enclosure.problem, alpha, np.tile(force, 3), np.tile(length, 3))
-        weight, own = self._rows
+        weight, own, _ = self._variables
         return _on_tau(rows, own, weight)
 
 
@@ -483,13 +454,6 @@ def _enclosed(
     S_rad = np.maximum(scaled.rad, scaled.rad.T) + np.abs(scaled.mid - scaled.mid.T)
     S = np.tril(scaled.mid) + np.tril(scaled.mid, -1).T
     return EnclosedSpace(S, S_rad * SAFE, load.mid, load.rad, *of_friction, rows=own)
-
-
-def _nearest(exact: Sequence[Fraction]) -> Ball:
-    """Balls around the floats next to numbers."""
-    mid = np.array([float(number) for number in exact])
-    same = np.array([Fraction(near) == number for near, number in zip(mid.tolist(), exact, strict=True)], dtype=bool)
-    return Ball(mid, np.where(same, 0.0, UNIT * np.abs(mid) * SAFE + TINY))
 
 
 def node_friction(
@@ -532,9 +496,8 @@ def _references(problem: ProblemData, alpha: Fraction) -> tuple[Floats, Floats]:
         reference, k = (Fraction(float(at[0])), 0) if at[0] else (Fraction(float(at[1])), 1)
         found[0, i, k] = float(reference)
         if k == 0 and at[1]:
-            exact = reference * ratio
-            found[0, i, 1] = float(exact)
-            found[1, i, 1] = 0.0 if Fraction(float(exact)) == exact else 2 * UNIT * float(exact)
+            other = nearest([reference * ratio])
+            found[0, i, 1], found[1, i, 1] = other.mid[0], other.rad[0]
     return found[0], found[1]
 
 

@@ -25,9 +25,8 @@ if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping, Sequence
 
     from enumsol.condensation.condensed import CondensedProblem
-    from enumsol.condensation.enclosure import CondensedEnclosure
+    from enumsol.condensation.enclosure import CondensedEnclosure, Products
     from enumsol.condensation.factorization import Factorization
-    from enumsol.condensation.products import Products
     from enumsol.support.array_types import AlphaLike, ArrayLike, Floats, Indices
 
 #: Singular values of the row-normalised contact rows below this fraction of the largest mean dependent rows.
@@ -257,7 +256,7 @@ class ContactBody(Immutable):
         if (origin := self._origin) is not None:
             mine, theirs = ((body.f, body.load_slope) for body in (self, origin))
             return origin.products if all(map(_equal, mine, theirs)) else origin.products.with_loads_of(self)
-        from enumsol.condensation.products import Products  # as above
+        from enumsol.condensation.enclosure import Products  # as above
 
         return Products.of(self)
 

@@ -316,7 +316,7 @@ class RootSet(Sequence[Root], Immutable):
         >>> enumsol.verify(problem, proof).verdicts
         ('does not run away', 'runs away', 'does not run away')
         """
-        from enumsol.roots.stability_proof import write_proof  # as above
+        from enumsol.roots.stability import write_proof  # as above
 
         if not len(self):
             raise InvalidArgumentError("there is no isolated root; expected one whose stability can be proven")

@@ -43,7 +43,6 @@ if TYPE_CHECKING:
     from enumsol.search.reduction import Point, Proposal
     from enumsol.selections.rational_selections import ExactSelections
     from enumsol.support.array_types import Alpha, Codes, Floats
-    from enumsol.trusted.arcs.precise import PreciseAtAlpha
     from enumsol.trusted.at_alpha import VerifiedSelection
 
 
@@ -253,7 +252,7 @@ class Solvers(SearchSetup):
 
     def _solved_precisely(self, codes: Codes) -> VerifiedSelection | None:
         """The verified solution of a complete selection in many digits; None where that is not to be had."""
-        return None if self._precise is None else self._precise.solve(codes)
+        return None if self._precise is None else self._precise(codes)
 
     def _index(self, codes: Codes) -> int:
         """The sign of det M of a selection where many digits show it, else 0."""
@@ -261,14 +260,14 @@ class Solvers(SearchSetup):
         return 0 if found is None else found.index
 
     @cached_property
-    def _precise(self) -> PreciseAtAlpha | None:
-        """The problem at this alpha in many digits; None for small ones, which rationals decide as fast."""
+    def _precise(self) -> Callable[[Codes], VerifiedSelection | None] | None:
+        """Solutions of selections in many digits; None for small ones, which rationals decide as fast."""
         from enumsol.condensation.exact import FAST_EXACT_DOF
-        from enumsol.trusted.arcs.precise import PreciseAtAlpha  # python-flint
+        from enumsol.trusted.arcs.precise import verified_in_many_digits  # python-flint
 
         if self.problem.n <= FAST_EXACT_DOF or self.data == "condensed" or not self.problem.held:
             return None
-        return PreciseAtAlpha.of(self.problem, Fraction(self.alpha), self.scaled.force, self.scaled.length)
+        return verified_in_many_digits(self.problem, Fraction(self.alpha), self.scaled.force, self.scaled.length)
 
     @cached_property
     def _engine(self) -> Engine:

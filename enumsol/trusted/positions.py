@@ -148,8 +148,7 @@ def _by_leaf(problem: Any, alpha: Fraction, forces: Ball, codes: Sequence[int]) 
 
 def _by_many_digits(problem: ContactProblem, alpha: Fraction, codes: Sequence[int], before: Ball) -> Ball | None:
     """Positions of all nodes at the regular root of a selection; None where many digits do not enclose it."""
-    from enumsol.trusted.arcs.many_digits import affordable
-    from enumsol.trusted.arcs.precise import PreciseSelection, PreciseSystem
+    from enumsol.trusted.arcs.precise import PreciseSelection, system_in_many_digits
 
-    system = PreciseSystem.of(problem) if affordable(problem) else None
+    system = system_in_many_digits(problem)
     return None if system is None else PreciseSelection(system, codes).positions(alpha, before)

@@ -83,7 +83,7 @@ from branching_rule.rules import RULES
 from enumsol import gallery
 from enumsol.model.statuses import UNDECIDED
 from enumsol.relaxation.active_set import ActiveSetEngine
-from enumsol.relaxation.imposed_rows import status_rows
+from enumsol.relaxation.engine import status_rows
 from enumsol.search import nodes as tree_nodes
 from shared.clock import least_time
 from shared.loads import DRAGGED, PRESSED, Loaded, block, oblique_wedge, straight_wedge

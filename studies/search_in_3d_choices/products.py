@@ -18,8 +18,7 @@ import scipy.linalg
 from enumsol import gallery
 from enumsol.model.sectors import SECTORS, direction, end_number, width_level
 from enumsol.model.statuses import CONTACT, OPEN, STICK, UNDECIDED
-from enumsol.relaxation.engine import FEASIBILITY_TOLERANCE, PRUNE_MARGIN
-from enumsol.relaxation.imposed_rows import EQUALITY
+from enumsol.relaxation.engine import EQUALITY, FEASIBILITY_TOLERANCE, PRUNE_MARGIN
 from enumsol.relaxation.space_relaxation import SpaceEngine, SpaceRelaxation, imposed
 from enumsol.search.certifiers.protocol import Unrecorded
 from enumsol.search.nodes import Relaxations

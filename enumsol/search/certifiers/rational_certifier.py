@@ -11,7 +11,7 @@ from flint import fmpq, fmpq_mat
 
 from enumsol.arithmetic.rationals import rational
 from enumsol.model.statuses import CONDITIONS, OPEN, SLIDING, RowKind
-from enumsol.relaxation.imposed_rows import INEQUALITY, imposed_rows
+from enumsol.relaxation.engine import INEQUALITY, imposed_rows
 from enumsol.search.certifiers.protocol import Bound, Certifier, UndecidedPart, solve_or_open
 from enumsol.search.fathoming import holds_below
 from enumsol.selections.solution import SelectionSolution

@@ -10,10 +10,9 @@ from typing import TYPE_CHECKING, Self
 
 import numpy as np
 
-from enumsol.arithmetic.balls import SAFE, TINY, UNIT, Ball, gamma, upper_norm
+from enumsol.arithmetic.balls import SAFE, TINY, UNIT, Ball, gamma, least_eigenvalue, upper_norm
 from enumsol.model.sectors import SECTORS, direction, end_number
 from enumsol.trusted.space.sector_rows import FRICTIONLESS, OPEN, SLIP_MINUS, SLIP_PLUS
-from enumsol.trusted.uniqueness_forms import least_eigenvalue
 
 if TYPE_CHECKING:
     from collections.abc import Sequence

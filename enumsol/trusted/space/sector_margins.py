@@ -13,9 +13,8 @@ import numpy as np
 
 from enumsol.arithmetic.balls import SAFE, TINY, UNIT, Ball, gamma, upper_norm, upper_sum
 from enumsol.condensation.space_condensed import EnclosedSpace
-from enumsol.trusted.energy_bounds import energy_bounds, form_bounds
 from enumsol.trusted.floating_bounds import balanced, balancing, bounds_within
-from enumsol.trusted.quadratic_forms import QuadraticForm
+from enumsol.trusted.quadratic_forms import QuadraticForm, energy_bounds, form_bounds
 from enumsol.trusted.space.sector_rows import FORBIDDEN, NONNEGATIVE, OF_DISCS, row_sign, row_terms
 
 if TYPE_CHECKING:
