@@ -388,7 +388,7 @@ def ascended(
 
 @dataclass(frozen=True, eq=False)
 class PairedTerms:
-    """The form (D lambda)'(S lambda - g) with D of (5.11), that does not depend on the piece.
+    """The form (D lambda)'(S lambda - g) with D of (5.12), that does not depend on the piece.
 
     D maps (lambda_n, lambda_t) of a node to (mu lambda_n + nu lambda_t, delta lambda_n + s lambda_t). The form is at
     most zero at every solution for any friction F with |delta| <= F s.

@@ -527,7 +527,9 @@ class Replay:
         search = self._search
         try:
             kind = leaves.kind_of(record, self._limits.tree)
-            leaf = kind and kind.read(record, replace(self._limits, codes=item.codes, declared=self._declared))
+            if kind is None:
+                return False
+            leaf: Any = kind.read(record, replace(self._limits, codes=item.codes, declared=self._declared))
             if isinstance(leaf, leaves.Unbalanced):
                 # the certifier finds a direction of its own
                 return search.excluded(item, NO_BOUND)
@@ -540,9 +542,9 @@ class Replay:
             return False
         if isinstance(leaf, leaves.OnlyReference):
             return search.closed(item, None, again=True)
-        if isinstance(leaf, records.ClosingRecord):
+        if leaf.closing:
             return search.closed(item, search.relaxations.energy(item.codes), again=True)
-        return isinstance(leaf, leaves.Solved) and search.settled(item)
+        return leaf.final and search.settled(item)
 
     def _form_over(self, codes: Codes) -> Any:
         """The form that was used last of those that serve a partial assignment in place of the energy."""
