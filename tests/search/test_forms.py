@@ -20,7 +20,7 @@ from enumsol.condensation.enclosure import CondensedEnclosure, EnclosedSystem
 from enumsol.search import nodes as policy
 from enumsol.search.solvers import Solvers
 from enumsol.trusted.exclusion import exclusion_margin
-from enumsol.trusted.quadratic_forms import EnclosedForm, Equations
+from enumsol.trusted.quadratic_forms import EnclosedForm, equations_of
 from enumsol.trusted.status_rows import row_signs
 
 pytestmark = pytest.mark.usefixtures("tree_only")
@@ -126,12 +126,12 @@ def test_enclosed_forms_hold_the_exact_ones(seed):
     # with equations: the same wherever they hold, more elsewhere
     weight = float(rng.uniform(0.1, 10.0))
     heavy = EnclosedForm.of(system, codes, multipliers, weight)
-    rows = Equations.of(system, codes)
-    factor = weight / np.maximum(np.einsum("ij,ij->i", rows.a, rows.a), 1e-300)
+    a, b = equations_of(system, codes)
+    factor = weight / np.maximum(np.einsum("ij,ij->i", a.mid, a.mid), 1e-300)
     kinds = {0: (0, 1), 1: (4, 5), 2: (4, 2), 3: (4, 3), 5: (4,), 6: ()}
     given = [forms.row(kind, i) for i, code in enumerate(codes) for kind in kinds[code]]
-    assert len(given) == len(rows.b)
-    order = _matching(given, rows)
+    assert len(given) == len(b.mid)
+    order = _matching(given, a.mid, b.mid)
 
     def weighted(i, j):
         return sum((_exact(factor[k]) * given[m][i] * given[m][j] for m, k in order), fmpq(0))
@@ -146,10 +146,10 @@ def _exact(value):
     return fmpq(*float(value).as_integer_ratio())
 
 
-def _matching(given, rows):
+def _matching(given, rows, loads):
     """Which exact equation each of the enclosed ones is, up to sign."""
     found = []
-    for k, (a, b) in enumerate(zip(rows.a, rows.b, strict=True)):
+    for k, (a, b) in enumerate(zip(rows, loads, strict=True)):
         ours = np.append(a, -b)
         for m, form in enumerate(given):
             theirs = np.array([float(int(x.p)) / float(int(x.q)) for x in form])
