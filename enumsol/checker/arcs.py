@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from enumsol.checker.arc_boxes import Boxes, BoxSelection, alpha_number, check_entries, inside
+from enumsol.checker.arc_boxes import Boxes, BoxSelection, alpha_number, check_entries, inside, shown
 from enumsol.proof.leaves import OnlyReference, Unbalanced
 from enumsol.proof.reading import RefusedError, names_only, quoted, same, units_from
 from enumsol.support.deadlines import tell
@@ -289,7 +289,7 @@ class ArcChecker:
             end = self._box(record, selection, follower, end)
             record = next(records, _END)
         if end != high:
-            self.fail(f"the boxes of selection {_text(codes)} do not cover its trace")
+            self.fail(f"the boxes of selection {shown(codes)} do not cover its trace")
         follower.finish()
         return record
 
@@ -346,7 +346,7 @@ class ArcChecker:
 
     def loose_end(self, codes: Codes, alpha: Fraction) -> None:
         """Fail since an arc begins or ends where it must not."""
-        self.fail(f"an arc of selection {_text(codes)} begins or ends at {float(alpha)} for no reason")
+        self.fail(f"an arc of selection {shown(codes)} begins or ends at {float(alpha)} for no reason")
 
     def _pair(self) -> None:
         """Pair events; each belongs to exactly one other, unless something beside it was left open."""
@@ -374,7 +374,7 @@ class ArcChecker:
             elif event.bound:
                 continue  # beyond, nothing is asked
             elif event.partners:
-                where = f"selection {_text(event.codes)} at {float(event.zero[0])}"
+                where = f"selection {shown(event.codes)} at {float(event.zero[0])}"
                 self.fail(f"an event of {where} has {len(event.partners)} partners")
             else:
                 self.open += 1  # bounds too wide to find the partner, or it was left open
@@ -446,7 +446,3 @@ class _Follower:
 def _is_next(value: Fraction, end: Fraction) -> bool:
     """True if it is the smallest float that is not smaller than ``end``: what is beyond would not be about it."""
     return value == end or (value > end and Fraction(np.nextafter(float(value), -np.inf)) < end)
-
-
-def _text(codes: Codes) -> str:
-    return "".join(map(str, codes))

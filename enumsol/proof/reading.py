@@ -31,8 +31,6 @@ if TYPE_CHECKING:
 
 #: Most digits of the numerator and of the denominator of a fraction.
 MOST_DIGITS = 4000
-#: Least and largest binary exponent of a unit.
-LEAST_EXPONENT, LARGEST_EXPONENT = -900, 900
 
 _SLIDING = FORWARD, BACKWARD
 #: Codes that are not final.
@@ -163,11 +161,7 @@ def units_from(header: dict[str, Any], p: int, *, by_node: bool = False) -> tupl
 
 def exponents_from(value: object, size: int) -> list[int]:
     """``size`` binary exponents of units."""
-    if not (
-        isinstance(value, list)
-        and len(value) == size
-        and all(type(x) is int and LEAST_EXPONENT <= x <= LARGEST_EXPONENT for x in value)
-    ):
+    if not (isinstance(value, list) and len(value) == size and all(type(x) is int and -900 <= x <= 900 for x in value)):
         raise ValueError(f"the units are not {size} binary exponents")
     return value
 

@@ -35,7 +35,7 @@ from enumsol.checker.space_checker import SpaceChecker
 from enumsol.checker.space_graph import SpaceGraphChecker
 from enumsol.proof.leaves import leaves_of
 from enumsol.proof.records import CutPiece, Tree
-from enumsol.search import form_policy as forms
+from enumsol.search import nodes as forms
 
 POINTS = {
     "roots": lambda: (triangle(), 5.0),

@@ -13,7 +13,7 @@ from rational_checker import check_records
 from rational_forms import Refused
 
 from enumsol import ContactProblem, branch_graph, gallery, verify
-from enumsol.search import form_policy as forms, interval_tree
+from enumsol.search import interval_tree, nodes as forms
 
 
 def triangle(**data):
