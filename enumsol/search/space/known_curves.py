@@ -21,21 +21,19 @@ from enumsol.search.space.curve_proposals import curve_point, placed, unplaced
 from enumsol.search.space.space_fathoming import without_sectors
 from enumsol.trusted.space.curve_runs import KnownCurve
 from enumsol.trusted.space.pieces import lie_along
-from enumsol.trusted.space.solution_curve import AlphaProblem
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Sequence
 
     from numpy.typing import NDArray
 
-    from enumsol.condensation.enclosure import CondensedEnclosure
     from enumsol.proof.records import Record
     from enumsol.search.space.piece_proposals import AlphaPoint, ExaminedPiece
     from enumsol.support.array_types import Codes, Floats, Mask
     from enumsol.trusted.space.curve_runs import CurveChain, CurveParts
     from enumsol.trusted.space.leaves import Open, SpaceRoot
     from enumsol.trusted.space.pieces import AlphaPiece, LeafArc
-    from enumsol.trusted.space.solution_curve import SolutionCurve
+    from enumsol.trusted.space.solution_curve import AlphaProblem, SolutionCurve
 
     Bounds = tuple[Fraction, Fraction]
 
@@ -76,7 +74,7 @@ class Curves:
 
     Parameters
     ----------
-    enclosure : CondensedEnclosure
+    given : AlphaProblem
     interval : (a, b), Fractions
     chains : sequence of CurveChain
         Those known from the beginning.
@@ -97,7 +95,7 @@ class Curves:
 
     def __init__(
         self,
-        enclosure: CondensedEnclosure,
+        given: AlphaProblem,
         interval: Bounds,
         chains: Iterable[CurveChain] = (),
         *,
@@ -105,7 +103,7 @@ class Curves:
         final: bool = False,
         tried: Iterable[tuple[Fraction, Fraction, Codes]] = (),
     ) -> None:
-        self._given, self.interval = AlphaProblem.of(enclosure), interval
+        self._given, self.interval = given, interval
         self.sampled, self.final, self.tried = sampled, final, set(tried)
         self.known: list[KnownCurve] = []
         self.ends: list[Bounds] = []

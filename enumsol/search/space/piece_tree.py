@@ -30,6 +30,7 @@ from enumsol.support.deadlines import TimeOverError, look, remaining
 from enumsol.trusted.space.leaves import Open, SpaceRoot
 from enumsol.trusted.space.pieces import AlphaPiece
 from enumsol.trusted.space.sector_rows import sector_children
+from enumsol.trusted.space.solution_curve import AlphaProblem
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
@@ -474,8 +475,8 @@ class PieceWorker:
 
     def examined(self, roots: Sequence[PieceNode], nodes: int) -> Answer:
         """Examine so many nodes, until the time is over or a curve is wanted."""
-        enclosure, interval = self.enclosure, self.interval
-        curves = Curves(enclosure, interval, self.chains, sampled=self.sampled, final=self.final, tried=self.tried)
+        enclosure, interval, given = self.enclosure, self.interval, AlphaProblem.of(self.enclosure)
+        curves = Curves(given, interval, self.chains, sampled=self.sampled, final=self.final, tried=self.tried)
         tree = PieceTree(enclosure, interval, self.units, curves, smallest=self.smallest)
         waiting = tree.examined(roots, nodes)
         rest = [item.sent() for item in waiting]
