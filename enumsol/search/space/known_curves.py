@@ -76,42 +76,30 @@ class Curves:
     ----------
     given : AlphaProblem
     interval : (a, b), Fractions
-    chains : sequence of CurveChain
-        Those known from the beginning.
-    sampled : bool
-        Curves through any solutions were asked for.
-    final : bool
-        No further curve is to be followed.
-    tried : set of (low, high, codes)
-        Pieces of alpha and leaves at whose middle a curve was asked for; no codes where no status was known.
 
     Attributes
     ----------
     known : list of KnownCurve
     ends : list of (Fraction, Fraction)
         Ranges of alpha around the ends of curves, in their order.
-    interval, sampled, final, tried : as given
+    sampled : bool
+        Curves through any solutions were asked for.
+    final : bool
+        No further curve is to be followed.
+    tried : set of (low, high, codes)
+        Pieces of alpha and leaves at whose middle a curve was asked for; no codes where no status was known.
+    interval : as given
     """
 
-    def __init__(
-        self,
-        given: AlphaProblem,
-        interval: Bounds,
-        chains: Iterable[CurveChain] = (),
-        *,
-        sampled: bool = False,
-        final: bool = False,
-        tried: Iterable[tuple[Fraction, Fraction, Codes]] = (),
-    ) -> None:
+    def __init__(self, given: AlphaProblem, interval: Bounds) -> None:
         self._given, self.interval = given, interval
-        self.sampled, self.final, self.tried = sampled, final, set(tried)
+        self.sampled = self.final = False
+        self.tried: set[tuple[Fraction, Fraction, Codes]] = set()
         self.known: list[KnownCurve] = []
         self.ends: list[Bounds] = []
         #: The curve of every box, numbered as in a proof.
         self._boxes: list[SolutionCurve] = []
         self._owner: list[int] = []
-        for chain in chains:
-            self.take(chain)
 
     # -- further curves --------------------------------------------------------------------------------------------
 
