@@ -32,8 +32,6 @@ if TYPE_CHECKING:
 _PARTS, _SHORTEST = 160, 2.0**-12
 #: Parts that are left then are searched as a whole, with at most so many programs, until that fails so often.
 _PROGRAMS, _FAILURES = 20, 16
-#: Growing motions of a range of alpha are looked for between such powers of two: K(mu) is enclosed at few mu then.
-_GRIDS = (1 / 32, 1 / 8, 1 / 2)
 
 
 @dataclass(frozen=True)
@@ -181,7 +179,8 @@ def _extended(proven: Proven, setting: Setting) -> bool | tuple[float, float]:
         at = zero_near(stiffness, motions, tried)
         if at is None:
             continue
-        for step in _GRIDS:
+        # between such powers of two motions are looked for, so that K(mu) is enclosed at few mu
+        for step in (1 / 32, 1 / 8, 1 / 2):
             place = float(np.log2(at)) / step
             below = np.floor(place - 0.25)
             low, high = (float(np.exp2(step * (below + k))) for k in (0, 1 if place - below < 0.75 else 2))

@@ -77,7 +77,7 @@ class SpaceChecker(TreeChecker[EnclosedSpace, "SpaceRoot | LooseSolution"]):
     @cached_property
     def tests(self) -> dict[type[Record], Test]:
         """Tests of leaves, by their kinds."""
-        return super().tests | {Excluded: self._excluded, BoxedRoot: self._in_box}
+        return super().tests | {BoxedRoot: self._in_box}
 
     def _settled(self, system: EnclosedSpace, codes: Codes) -> SpaceRoot | Open | None:
         return settle(system, codes)

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from enumsol.checker.history_checker import SearchRecords, search_records
+from enumsol.checker.history_checker import search_records
 from enumsol.checker.reports import StabilityVerificationReport
 from enumsol.checker.walk import ProofChecker
 from enumsol.condensation.enclosure import enclosure_of
@@ -131,7 +131,7 @@ class StabilityChecker(ProofChecker):
         """The roots, by the proof that they are all."""
         checker = self.checker
         checker.enclosure, checker.located = enclosure_of(self.problem), {}
-        self.report = report = checker.run(SearchRecords(search_records(records)))
+        self.report = report = checker.run(search_records(records))
         if report.failures:
             self.failures += [f"roots: {failure}" for failure in report.failures]
             raise RefusedError("the proof of the roots does not hold")

@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from enumsol.auditing.known_solutions import KnownSolutions
+from enumsol.auditing.results import KnownSolutions
 from enumsol.collection.entries import COLLECTION, INDEX, CertifiedSolutions, CollectionEntry, get
 from enumsol.errors import InvalidArgumentError, MissingDependencyError
 from enumsol.fixed_points.tresca import TrescaState

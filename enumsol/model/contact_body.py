@@ -55,7 +55,7 @@ class ContactBody(Immutable):
     friction_slope: Any
     slip_offset: Floats
     #: How far the slip offset may be from ``slip_offset``, and its value where no floats hold it: a step of a history
-    #: starts where the step before it ended (see enumsol.model.restart).
+    #: starts where the step before it ended (see enumsol.model.problem).
     offset_radius: Floats | None = None
     exact_offset: tuple[Fraction, ...] | None = None
     #: The problem that this one was made from with the same matrices, which computes what rests on them for both.

@@ -281,8 +281,8 @@ def history_page(history: History, heading: parts.Heading) -> str:
         parts.proof_commands("history", "--steps STEPS", "."),
     )
     words = {
-        "steps": parts.scrolling("Steps", html_table(*steps_table(history.data, units))),
-        "tree": escape("\n".join(tree_lines(history.data, 1000))),
+        "steps": parts.scrolling("Steps", html_table(*steps_table(history, units))),
+        "tree": escape("\n".join(tree_lines(history, 1000))),
         "figures": _figures(history, units),
         "bodies": _bodies(history, units),
     }
@@ -354,7 +354,7 @@ def _certified(history: History) -> list[str]:
         known = "Nothing is proven: the result rests on floating-point arithmetic."
     else:
         known = f"The history is proven to be unique until step {history.unique_until}."
-    stages = history.data.stages
+    stages = history.all_stages
     widest = max((stage.largest_radius for stage in stages), default=0.0)
     size = max((float(np.max(np.abs(stage.start.offset), initial=0.0)) for stage in stages), default=0.0)
     searches = counted(len(stages), "search", "searches")

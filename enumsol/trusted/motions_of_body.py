@@ -183,7 +183,7 @@ class BodyMotions:
         return Setting(self._stiffness_of(part, dofs, rows), motions, dofs, rows, list(moves), unloaded)
 
     def _limit(self, held: Collection[int], F: list[Ball], i: int, directions: Ball | None) -> tuple[list[Ball], Ball]:
-        """Tangential move of a node at its limit, by axis, and by how much T_i sinks meanwhile (theory, (15.3))."""
+        """Tangential move of a node at its limit, by axis, and by how much T_i sinks meanwhile (theory, (15.4))."""
         if len(F) == 1:
             sign = 1.0 if SLIP_PLUS in held else -1.0
             return [Ball.exact(np.array(sign))], F[0][i]

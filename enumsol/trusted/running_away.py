@@ -75,7 +75,7 @@ class Touching:
 
 @dataclass(frozen=True, eq=False)
 class Motions:
-    """Directions in which contact rows may begin to move at an equilibrium, k of them (theory, (15.3)).
+    """Directions in which contact rows may begin to move at an equilibrium, k of them (theory, (15.4)).
 
     Attributes
     ----------

@@ -47,9 +47,9 @@ class Unknowns:
     """
 
     def __init__(self, p: int, nodes: Indices, own: Mask, directions: Indices) -> None:
-        self.nodes, self.normal = nodes, np.flatnonzero(own)
+        self.nodes, self.normal = nodes, own.nonzero()[0]
         self.places = np.concatenate([nodes, p + nodes[own]])
-        self.side = np.flatnonzero(directions)
+        self.side = directions.nonzero()[0]
         self._turned, self._directions = nodes[self.side], directions[self.side]
         self._along = p + self._turned
 
@@ -110,9 +110,6 @@ class Selection(Unknowns):
         1 for slip+, -1 for slip-.
     moving, moving_signs : int arrays
         Rows of w that have to be nonnegative, and the signs by which they are multiplied.
-    conditions : tuple of (node, kind)
-        What has to be nonnegative: rows of w, forces lambda_n, then both sides of the cones of sticking nodes, then
-        both bounds of the rigid displacement; for its mode j the node is p + j.
     """
 
     def __init__(self, codes: Sequence[int], modes: int = 0) -> None:
@@ -120,22 +117,31 @@ class Selection(Unknowns):
         self.p = p = len(self.codes)
         self.size, self.modes = 2 * p + modes, np.arange(modes)
         given = np.array(self.codes, dtype=np.intp)
-        opened, self.closed = np.flatnonzero(given == OPEN), np.flatnonzero(given != OPEN)
+        opened, self.closed = (given == OPEN).nonzero()[0], (given != OPEN).nonzero()[0]
         own = given[self.closed]
         super().__init__(p, self.closed, own == STICK, _SIDES[own])
         self.places = self.unknown = np.concatenate([self.places, 2 * p + self.modes])
         self.stick, self.slip, self.slip_signs = self.closed[self.normal], self._turned, self._directions
         self.moving = np.concatenate([opened, self._along])
         self.moving_signs = np.concatenate([-np.ones(len(opened), dtype=np.intp), self.slip_signs])
+
+    @cached_property
+    def conditions(self) -> tuple[tuple[int, int], ...]:
+        """Nodes and kinds of what has to be nonnegative.
+
+        Rows of w, forces lambda_n, then both sides of the cones of sticking nodes, then both bounds of the rigid
+        displacement; for its mode j the node is p + j.
+        """
+        p, modes, moving = self.p, range(len(self.modes)), self.moving.tolist()
         stick, slips = self.stick.tolist(), zip(self.slip.tolist(), self.slip_signs.tolist(), strict=True)
-        self.conditions: tuple[tuple[int, int], ...] = (
-            *((i, PENETRATION) for i in opened.tolist()),
+        return (
+            *((row, PENETRATION) for row in moving if row < p),
             *((i, SLIP_FORWARD if sign > 0 else SLIP_BACKWARD) for i, sign in slips),
             *((i, NORMAL_FORCE) for i in self.closed.tolist()),
             *((i, CONE_PLUS) for i in stick),
             *((i, CONE_MINUS) for i in stick),
-            *((p + j, BOUND_PLUS) for j in range(modes)),
-            *((p + j, BOUND_MINUS) for j in range(modes)),
+            *((p + j, BOUND_PLUS) for j in modes),
+            *((p + j, BOUND_MINUS) for j in modes),
         )
 
     def matrix(self, S: Any, F: Any) -> Any:

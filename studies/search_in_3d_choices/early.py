@@ -223,7 +223,7 @@ def early(run: Run, cases, max_nodes) -> None:
             for build, alpha in problems:
                 problem = build()
                 problem.enclosure  # noqa: B018 (made once, not part of the search)
-                taken, engine = Solvers(problem, alpha, values).searched(SearchLimits(None, max_nodes))
+                taken, engine = Solvers(problem, alpha, values).searched(SearchLimits(max_nodes=max_nodes))
                 results.append(taken)
                 branched += engine.branched
             totals = {key: sum(result[key] for result in results) for key in results[0]}

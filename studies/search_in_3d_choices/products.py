@@ -312,7 +312,7 @@ def forms(run: Run, most: int) -> None:
     ):
         solvers = Solvers(gallery.wedge3d(*cells, friction=F, multipliers="nodes"), 0.0, "verified")
         certifier = solvers.certifier()
-        search = solvers.search(certifier, SearchLimits(None, SMOKE_NODES if run.smoke else most))
+        search = solvers.search(certifier, SearchLimits(max_nodes=SMOKE_NODES if run.smoke else most))
         search.every = every
         started = process_time()
         outcome = search.run()

@@ -297,7 +297,7 @@ def searched(build, alpha, kind, constants=(), place=None):
         started = process_time()
         solvers = Solvers(problem, alpha, kind, place)
         certifier = solvers.certifier()
-        outcome = solvers.search(certifier, SearchLimits(None, MAX_NODES)).run()
+        outcome = solvers.search(certifier, SearchLimits(max_nodes=MAX_NODES)).run()
         seconds = process_time() - started
     roots = distinct_roots(certifier.certified.verified.items())[0]
     complete = outcome.stopped is None and not outcome.undecided

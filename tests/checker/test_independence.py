@@ -99,7 +99,6 @@ SHARED = {
         *("LeafReference", "LooseSolution", "PieceWeights"),
         *("equations", "how_far_off", "moderate_units"),
     },
-    "proof.begun": None,
     "proof.proof_file": {"PROOF_VERSION", "Proof", "fraction_text", "packed", "coarse"},
     "proof.reading": {"fits", "rational_text"},
     "proof.records": None,

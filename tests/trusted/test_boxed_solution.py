@@ -82,7 +82,7 @@ def natural(problem, y):
 
 @pytest.mark.slow
 def test_steps_stay_within_their_bounds():
-    """zeta - Y N(y) is what (12.13b) says, and contracts, at random points of sets of all sizes."""
+    """zeta - Y N(y) is what (12.7) and (12.13) say, and contracts, at random points of sets of all sizes."""
     rng, tried = np.random.default_rng(0), 0
     for seed in range(some(12, of=60)):
         solvers, y, _, _, _ = boxed(seed)

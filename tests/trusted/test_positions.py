@@ -91,5 +91,5 @@ def test_a_history_on_weak_springs_starts_every_step_from_what_is_known_to_many_
     problem = dovetail(friction=0.3)
     history = enumsol.histories(problem, [0.5 * problem.f, problem.f, 0.9 * problem.f], max_nodes=3000)
     assert (history.complete, history.unique_until) == (True, 3)
-    assert max(stage.largest_radius for stage in history.data.stages) < 1e-15
+    assert max(stage.largest_radius for stage in history.all_stages) < 1e-15
     assert accepted_report(problem, history.proof).unique_until == 3

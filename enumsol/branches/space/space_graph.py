@@ -19,8 +19,9 @@ from enumsol.branches.space.pieces import runs_and_turns
 from enumsol.branches.ways import Made
 from enumsol.condensation.enclosure import NotEnclosedError, enclosure_of
 from enumsol.model.sectors import SECTORS, is_sector, nearest, run_of
-from enumsol.proof.curve_records import CurveBoxRecord, CutPiece
+from enumsol.proof.curve_records import CurveBoxRecord
 from enumsol.proof.leaves import UndecidedRecord
+from enumsol.proof.records import CutPiece
 from enumsol.proof.writer import ProofWriter, unit_exponents
 from enumsol.roots.enumerate import enumerate_roots
 from enumsol.roots.root_set import RigidBound, RootSet, SearchStats, Undecided

@@ -15,9 +15,9 @@ from enumsol.arithmetic.rationals import simplest
 from enumsol.condensation.space_condensed import AlphaSpace
 from enumsol.model.sectors import DEEPEST, SECTORS, level_of, width_level
 from enumsol.model.statuses import CONTACT, UNDECIDED
-from enumsol.proof.curve_records import CutPiece, OnCurve
+from enumsol.proof.curve_records import OnCurve
 from enumsol.proof.leaves import Excluded
-from enumsol.proof.records import Branching
+from enumsol.proof.records import Branching, CutPiece
 from enumsol.relaxation.engine import PRUNE_MARGIN
 from enumsol.search.outcome import StopReason
 from enumsol.search.parts import Answer, Spread

@@ -15,7 +15,7 @@ import scipy.linalg
 from enumsol.arithmetic.balls import factor_above
 from enumsol.model.sectors import SECTORS
 from enumsol.model.statuses import CONTACT, OPEN, STICK, UNDECIDED
-from enumsol.search.closing import TreeCloser
+from enumsol.search.nodes import TreeCloser
 from enumsol.search.space.space_newton import Isotropic
 from enumsol.support.deadlines import look
 from enumsol.trusted.space.sector_rows import leaf_code

@@ -42,10 +42,8 @@ from enumsol.relaxation.convex_forms import SlipFormAscent
 from enumsol.relaxation.engine import PRUNE_MARGIN, Relaxation
 from enumsol.relaxation.space_relaxation import SpaceEngine, SpaceRelaxation
 from enumsol.search.certifiers.protocol import WIDEN, Bound, Certifier, Refine, UndecidedPart, Unrecorded
-from enumsol.search.closing import TreeCloser
-from enumsol.search.form_policy import Forms
+from enumsol.search.nodes import Forms, TreeCloser
 from enumsol.search.outcome import HOLD
-from enumsol.search.resume import Reader
 from enumsol.search.setup import WEAK, SearchSetup, weakly_held
 from enumsol.search.space.open_leaves import Cause, KnownBoxes, obstacle, sector_to_halve
 from enumsol.search.space.space_fathoming import SpaceCloser, SpaceClosing, solved
@@ -525,9 +523,9 @@ class SpaceSolvers(SearchSetup):
         other.__dict__.pop("_engine", None)
         return other
 
-    def reader(self) -> Reader:
-        """Understands the records of an earlier proof."""
+    @property
+    def limits(self) -> Limits:
+        """Limits of the records at the root of the tree of a proof."""
         system, tree = self.system, Tree.SPACE if self.problem.held else Tree.FLOATING_SPACE
         codes, modes = (UNDECIDED,) * system.p, self.problem.modes.r
-        limits = Limits(codes, tree, components=len(system.g), modes=modes)
-        return Reader(limits, self.enclosed)
+        return Limits(codes, tree, components=len(system.g), modes=modes)

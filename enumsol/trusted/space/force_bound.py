@@ -148,7 +148,7 @@ def is_unbalanced_in_space(system: EnclosedSpace, codes: Sequence[int], z: Float
     """True if no forces below a partial assignment are in balance with the load, by z (r,); see theory, (14.7).
 
     z'h > 0, and z'G y <= 0 for all y of every node: (1, tau) with tau in the disc, or on the arc of its sector. Proven
-    at both ends of a piece of alpha, it is so in between (theory, section 14.14).
+    at both ends of a piece of alpha, it is so in between (theory, section 14.8).
     """
     with np.errstate(over="ignore", invalid="ignore"):
         (G, h), p, k = (system.rows.G, system.rows.h), system.p, gamma(len(z) + 16)
