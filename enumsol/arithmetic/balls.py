@@ -7,12 +7,13 @@ be used. A ball is a pair of arrays (midpoint, radius), and `Ball` has both, wit
 from __future__ import annotations
 
 from dataclasses import dataclass
+from fractions import Fraction
 from typing import TYPE_CHECKING, Any, SupportsIndex
 
 import numpy as np
 import scipy.sparse as sp
 import scipy.sparse.linalg as spla
-from scipy.linalg import cho_solve, eigh
+from scipy.linalg import cho_solve
 from scipy.linalg.lapack import dgetrf, dtrtri
 
 if TYPE_CHECKING:
@@ -39,8 +40,6 @@ SAFE = 1.0 + 2.0**-40
 TINY = 2.0**-960
 #: The same for the norms of such data.
 ROOT_TINY = 2.0**-480
-#: From so many rows on a smallest eigenvalue is found by Lanczos' method, so accurately.
-_MANY_ROWS, _NEARLY = 1000, 1e-3
 
 
 def gamma(k: int) -> float:
@@ -137,34 +136,13 @@ def factor_above(M: Array, shift: float = 0.0) -> Array | None:
         return None
 
 
-def lowest_mode(A: Array, M: Array | None = None, shift: float = 0.0) -> tuple[float, Array]:
-    """The smallest eigenvalue of a symmetric matrix, relative to M, and its eigenvector; no claim.
-
-    Raises
-    ------
-    numpy.linalg.LinAlgError
-        A + shift M is not positive definite.
-    """
-    if len(A) < _MANY_ROWS:
-        values, modes = eigh(A, M, subset_by_index=[0, 0], check_finite=False)
-        return float(values[0]), np.asarray(modes[:, 0])
-    L = np.linalg.cholesky(A + shift * M if M is not None else A)
-    inverse = spla.LinearOperator(A.shape, lambda x: cho_solve((L, True), x, check_finite=False), dtype=float)
-    start = np.random.default_rng(0).normal(size=len(A))
-    values, modes = spla.eigsh(A, 1, M, sigma=-shift, OPinv=inverse, v0=start, tol=_NEARLY)
-    return float(values[0]), np.asarray(modes[:, 0])
-
-
 def dense_eigenvalue_bound(S: Array) -> float:
     """Lower bound on the smallest eigenvalue of a symmetric dense matrix; at most 0 when none positive was proven.
 
     A Cholesky factorization of S - mu I that runs to its end proves S - mu I >= -gamma trace (Rump 2006).
     """
     n = len(S)
-    try:
-        estimate = float(np.linalg.eigvalsh(S)[0]) if n < _MANY_ROWS else lowest_mode(S)[0]
-    except np.linalg.LinAlgError:
-        return 0.0
+    estimate = _smallest_eigenvalue(S)
     slack = gamma(n + 2) / (1 - gamma(n + 2)) * float(np.trace(np.abs(S))) * SAFE + TINY
     shift = 0.9 * estimate
     for _ in range(4):
@@ -175,6 +153,27 @@ def dense_eigenvalue_bound(S: Array) -> float:
             return (shift - slack - 4 * UNIT * (float(np.max(np.abs(np.diagonal(S)))) + shift)) / SAFE
         shift *= 0.5
     return 0.0
+
+
+def _smallest_eigenvalue(S: Array) -> float:
+    """An estimate of the smallest eigenvalue of a symmetric dense matrix, which need not be near if it is large."""
+    if len(S) <= 500:  # all eigenvalues of larger ones take longer than some steps of inverse iteration
+        try:
+            return float(np.linalg.eigvalsh(S)[0])
+        except np.linalg.LinAlgError:
+            return 0.0
+    L, x, size = factor_above(S), np.ones(len(S)), np.sqrt(len(S))
+    if L is None:
+        return 0.0
+    for _ in range(8):
+        x = cho_solve((L, True), x / size, check_finite=False)
+        size = np.linalg.norm(x)
+    return float(1.0 / size)
+
+
+def least_eigenvalue(M: Ball) -> float:
+    """Lower bound of the smallest eigenvalue of symmetric matrices; at most 0 where none positive is proven."""
+    return (dense_eigenvalue_bound(M.mid) - float(upper_norm(M.rad))) / SAFE if M.finite else 0.0
 
 
 def sparse_eigenvalue_bound(A: sp.csc_array, estimate: float) -> float:
@@ -340,6 +339,19 @@ def _of_radii(one: Array, other: Array) -> Any:
     """A product, which is not formed where one factor is zero and the other bounded: many matrices are exact."""
     idle = any(not np.any(a) and np.all(np.isfinite(b)) for a, b in ((one, other), (other, one)))
     return 0.0 if idle else one @ other
+
+
+def nearest(exact: Sequence[Fraction]) -> Ball:
+    """Balls around the floats next to numbers, of radius zero where these are floats and unbounded beyond them."""
+    mid, rad = np.zeros(len(exact)), np.zeros(len(exact))
+    for i, number in enumerate(exact):
+        try:
+            mid[i] = value = float(number)
+        except OverflowError:
+            rad[i] = np.inf
+        else:
+            rad[i] = 0.0 if Fraction(value) == number else 2 * UNIT * abs(value) + TINY
+    return Ball(mid, rad)
 
 
 def smaller(one: Ball, other: Ball) -> Ball:

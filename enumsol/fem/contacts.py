@@ -12,7 +12,7 @@ import scipy.sparse as sp
 from enumsol.errors import InvalidArgumentError
 from enumsol.fem.assembly import pressed
 from enumsol.fem.conditions import Obstacle, names_of
-from enumsol.fem.meshes import unit_vectors
+from enumsol.fem.meshes import SAME, unit_vectors
 from enumsol.fem.restrained import ContactRows, Supports, means_of_nodes, movable
 from enumsol.model.cells import KINDS, boundary_facets, by_kind, contact_nodes, facet_rows, lines_along, padded
 from enumsol.support.arguments import finite_number, shown
@@ -32,8 +32,6 @@ _BEHIND = -1e-6
 _BEYOND = 1e-6
 #: Shape functions below this are rounding at a node.
 _AT_NODE = 1e-10
-#: A gap below this share of the extent of the mesh is rounding, and none; so is what is left of Newton's equation.
-_TOUCHING = 1e-9
 #: Newton's steps at most to a point of a facet; of plane triangles and straight edges the first is the last.
 _STEPS = 30
 #: A share of a uniform pressure below this part of the largest is rounding of none.
@@ -43,7 +41,7 @@ _CONVERGED = 1e-13
 
 
 @dataclass(frozen=True)
-class Pair:
+class PairOfParts:
     """Two parts of the boundary that may touch.
 
     Attributes
@@ -59,7 +57,7 @@ class Pair:
     gap: float | None = None
 
     @classmethod
-    def of(cls, value: Sequence[Any], option: str = "pairs") -> Pair:
+    def of(cls, value: Sequence[Any], option: str = "pairs") -> PairOfParts:
         """The pair given by two names, or by two names and a gap (of a tie the largest one).
 
         Raises
@@ -79,7 +77,7 @@ class Pair:
         return cls(names[0], names[1], gap)
 
     @classmethod
-    def all_of(cls, value: object) -> list[Pair]:
+    def all_of(cls, value: object) -> list[PairOfParts]:
         """Every pair of a list.
 
         Raises
@@ -111,7 +109,7 @@ class Group:
     ----------
     parts : list of str
         Contact parts, or the first part of a pair.
-    pair : Pair or None
+    pair : PairOfParts or None
     normals : (k, d) array
         Of the boundary, out of the body, also where an obstacle gives the normals of the rows.
     count, missed, shared : int
@@ -119,7 +117,7 @@ class Group:
     """
 
     parts: list[str]
-    pair: Pair | None
+    pair: PairOfParts | None
     normals: Floats
     count: int
     missed: int = 0
@@ -156,6 +154,12 @@ class Contacts:
     areas: Floats
     groups: list[Group]
 
+    @property
+    def by_group(self) -> list[tuple[Group, slice]]:
+        """Groups, each with the rows of its nodes."""
+        ends = np.cumsum([group.count for group in self.groups]).tolist()
+        return [(group, slice(end - group.count, end)) for group, end in zip(self.groups, ends, strict=True)]
+
     def without(self, nodes: Integers) -> Contacts:
         """Contacts without some nodes, whose areas go to the others of their group.
 
@@ -164,9 +168,8 @@ class Contacts:
         InvalidArgumentError
             No others are left to a group.
         """
-        kept, areas, groups, first = ~np.isin(self.rows.nodes, nodes), self.areas.copy(), [], 0
-        for group in self.groups:
-            own = slice(first, first := first + group.count)
+        kept, areas, groups = ~np.isin(self.rows.nodes, nodes), self.areas.copy(), []
+        for group, own in self.by_group:
             if not np.any(kept[own]):
                 raise InvalidArgumentError(f"contact of {group} has no node that can be in contact; expected some")
             if np.any(areas[own]):
@@ -192,11 +195,11 @@ def contacts_of(body: NodalBasis, mesh: PartedMesh, options: Options, held: Supp
         There are no parts, one does not exist or is not on the boundary, or there is a node that cannot be one: held in
         some components only, without a normal, or at the centre of an obstacle; or no node of a pair faces anything.
     """
-    parts, pairs = names_of(options.contact, "contact"), Pair.all_of(options.pairs)
+    parts, pairs = names_of(options.contact, "contact"), PairOfParts.all_of(options.pairs)
     if not parts and not pairs:
         raise InvalidArgumentError("contact names no part; expected the contact boundary, or pairs")
     found: list[tuple[ContactRows, Floats, Group]] = []
-    groups: list[tuple[list[str], Pair | None]] = [(parts, None)] if parts else []
+    groups: list[tuple[list[str], PairOfParts | None]] = [(parts, None)] if parts else []
     groups += [([pair.slave], pair) for pair in pairs]
     on: dict[str, Integers] = {}
     areas, taken = [], np.zeros(0, dtype=np.int64)
@@ -250,7 +253,7 @@ def _group(
     facets: Integers,
     held: Supports,
     obstacle: object,
-    pair: Pair | None,
+    pair: PairOfParts | None,
     taken: Integers,
 ) -> tuple[ContactRows, Floats, Group]:
     """Contact nodes with their normals on some facets, and the distances to what they face."""
@@ -264,19 +267,9 @@ def _group(
             f"all nodes of {parts[0]} belong to another contact already; expected a boundary of its own for the pair "
             f"{pair}"
         )
-    if pair is not None and not len(facets):
-        normals = normals_against(body, mesh, touching, pair.master)
-        normals = unit_vectors(np.where(held.mirrored[touching], 0.0, normals), "normals at the plane of symmetry")
-        rows, gaps, group = _paired(body, mesh, touching, normals, held, pair)
-        return rows, gaps, replace(group, shared=shared)
     # the circumference is none on the axis, which has a normal all the same
     integrals = replace(body, axisymmetric=False).on_part(facets, "contact", np.asarray, lumped=True)
-    if obstacle is None:
-        normals = unit_vectors(pressed(integrals[touching], touching), "normals of the boundary")
-        # what averages with the other half of the body would be
-        normals = unit_vectors(np.where(held.mirrored[touching], 0.0, normals), "normals at the plane of symmetry")
-        own, gaps = normals, np.zeros(len(touching))
-    else:
+    if obstacle is not None:
         given = Obstacle.of(obstacle, mesh.points.shape[1])
         normals, gaps = given.normals_and_gaps(mesh.points[touching])
         own = np.nan_to_num(integrals[touching] / np.linalg.norm(integrals[touching], axis=1, keepdims=True))
@@ -285,11 +278,19 @@ def _group(
                 f"obstacle {given.kind} is behind the contact boundary, whose outward normals point away from it; "
                 f"expected {given.expected}"
             )
-    if pair is None:
-        nodes = movable(touching, normals, held)
-        return nodes, gaps[nodes.kept], Group(parts, None, own[nodes.kept], len(nodes.nodes))
-    rows, gaps, group = _paired(body, mesh, touching, normals, held, pair)
-    return rows, gaps, replace(group, shared=shared)
+    else:
+        if pair is not None and not len(facets):
+            normals = normals_against(body, mesh, touching, pair.master)
+        else:
+            normals = unit_vectors(pressed(integrals[touching], touching), "normals of the boundary")
+        # what averages with the other half of the body would be
+        normals = unit_vectors(np.where(held.mirrored[touching], 0.0, normals), "normals at the plane of symmetry")
+        own, gaps = normals, np.zeros(len(touching))
+    if pair is not None:
+        rows, gaps, group = _paired(body, mesh, touching, normals, held, pair)
+        return rows, gaps, replace(group, shared=shared)
+    nodes = movable(touching, normals, held)
+    return nodes, gaps[nodes.kept], Group(parts, None, own[nodes.kept], len(nodes.nodes))
 
 
 def _touching(body: NodalBasis, part: str, facets: Integers) -> Integers:
@@ -303,7 +304,7 @@ def _touching(body: NodalBasis, part: str, facets: Integers) -> Integers:
 
 
 def _paired(
-    body: NodalBasis, mesh: PartedMesh, touching: Integers, normals: Floats, held: Supports, pair: Pair
+    body: NodalBasis, mesh: PartedMesh, touching: Integers, normals: Floats, held: Supports, pair: PairOfParts
 ) -> tuple[ContactRows, Floats, Group]:
     """Nodes that face the other part of a pair, relative to it."""
     apart = ~np.isin(touching, mesh.part(pair.master))  # of both, as at the tip of a crack: in contact with itself
@@ -333,7 +334,7 @@ def facing(
     return faced(mesh.points, nodes, normals, facets, outward, others)
 
 
-def facing_normals(body: NodalBasis, mesh: PartedMesh, pair: Pair) -> tuple[Integers, Floats]:
+def facing_normals(body: NodalBasis, mesh: PartedMesh, pair: PairOfParts) -> tuple[Integers, Floats]:
     """All nodes of the first part, and the means of the normals of the facets around them, which corners have as well.
 
     Of nodes without facets they are those of `normals_against`.
@@ -384,7 +385,7 @@ def normals_against(body: NodalBasis, mesh: PartedMesh, nodes: Integers, master:
     facets = _facets(body, {master: mesh.part(master)})
     away = body.on_part(facets, master, np.asarray)[facets].sum(axis=1)
     targets = _Facets.all_of(mesh.points, facets)
-    tolerance = _TOUCHING * float(np.max(np.ptp(mesh.points, axis=0)))
+    tolerance = SAME * float(np.max(np.ptp(mesh.points, axis=0)))
     sums = np.zeros((len(nodes), mesh.points.shape[1]))
     for k, point in enumerate(mesh.points[nodes]):
         rows, distances, normals = map(np.concatenate, zip(*(own.nearest(point) for own in targets), strict=True))
@@ -421,7 +422,7 @@ def faced(
     others : (l, c) int array
         All other facets on the boundary of bodies: a node is inside the other body where none of them is between.
     """
-    tolerance = _TOUCHING * float(np.max(np.ptp(points, axis=0)))
+    tolerance = SAME * float(np.max(np.ptp(points, axis=0)))
     targets, between = (_Facets.all_of(points, rows) for rows in (facets, others))
     away = outward[facets].sum(axis=1)
     found = np.zeros(len(nodes), dtype=bool)

@@ -1,4 +1,4 @@
-"""What successive approximations ended with, and its file."""
+"""Result of successive approximations, and its file."""
 
 from __future__ import annotations
 
@@ -52,7 +52,7 @@ def _check_shapes(arrays: dict[str, Floats], body: Problem, path: str) -> None:
 
 
 class Outcome(enum.Enum):
-    """How successive approximations ended."""
+    """Outcomes of successive approximations."""
 
     CONVERGED = "converged"
     ROUNDING = "rounding"
@@ -228,7 +228,7 @@ class FixedPoint(TrescaState):
             "rounding": repr(self.rounding),
             "period": self.period,
             "node_ids": [str(label) for label in self.problem.node_ids],
-            "statuses": [status.value for status in self.statuses],
+            "statuses": self.statuses,
         }
         arrays = {name: getattr(self, name) for name in (*_names(self.problem), "u")}
         arrays = {name: np.zeros(0) if array is None else array for name, array in arrays.items()}

@@ -10,7 +10,7 @@ from functools import cached_property
 
 import numpy as np
 
-from enumsol.arithmetic.balls import factor_above, lowest_mode
+from enumsol.arithmetic.balls import factor_above
 from enumsol.support.array_types import Floats, Indices, Mask
 from enumsol.support.deadlines import look
 
@@ -38,8 +38,10 @@ _HOPELESS, _HOPELESS_SQUARES = -4.0, -1.0
 #: Rounds, steps of each, and the weight of H in one by what lacked before it; after so many rounds in a row that each
 #: leave more than this share of what lacks there is no other.
 _ROUNDS, _EVALUATIONS, _ABOVE, _IN_VAIN, _SLOW = 16, 15, 1.05, 2, 0.9
-#: Nodes whose numbers move, in turn, where there are more than the last of these: more than 16 hardly ever help.
-_MOVING = 16, 32, 64
+#: Nodes whose numbers move, in turn, where there are more than so many, or all: 16 suffice for most of the blocks.
+_MOVING, _FEW = (16, 32), 64
+#: So many rows take less time by Lanczos' method.
+_MANY_ROWS = 1000
 #: The objective where M is not definite.
 _BEYOND = 1e10
 
@@ -256,7 +258,7 @@ class Descent:
         Raises
         ------
         numpy.linalg.LinAlgError
-            H is not positive definite.
+            H is not positive definite; or so many rows are far from what descent mends.
         """
         mu, _, nu = self._parts
         z, hopeless = np.zeros(nu.stop), _HOPELESS
@@ -264,7 +266,7 @@ class Descent:
             # what mu begins with where squares count
             z[mu], hopeless = np.log(3.0), _HOPELESS_SQUARES
         least, mode = self._least(z)
-        for many in _MOVING if self.nodes.count > _MOVING[-1] else (self.nodes.count,):
+        for many in _MOVING if self.nodes.count > _FEW else (self.nodes.count,):
             if least > _ENOUGH or least < hopeless:
                 break
             part, places = self._some(z, least, mode, many)
@@ -371,7 +373,19 @@ class Descent:
 
     def _least(self, z: Floats) -> tuple[float, Floats]:
         """The smallest eigenvalue relative to H, and to the mean of mu and kappa, and its eigenvector."""
-        return lowest_mode(self._form(z) / self._mean(z), self.H, -_HOPELESS)
+        from scipy.linalg import cho_solve, eigh  # not for problems that need no numbers
+        from scipy.sparse.linalg import LinearOperator, eigsh
+
+        form, H = self._form(z) / self._mean(z), self.H
+        if len(H) < _MANY_ROWS:
+            values, modes = eigh(form, H, subset_by_index=[0, 0], check_finite=False)
+        else:
+            # of what is worse the factorization fails
+            L = np.linalg.cholesky(form - _HOPELESS * H)
+            inverse = LinearOperator(H.shape, lambda x: cho_solve((L, True), x, check_finite=False), dtype=float)
+            start = np.random.default_rng(0).normal(size=len(H))
+            values, modes = eigsh(form, 1, H, sigma=_HOPELESS, OPinv=inverse, v0=start, tol=1e-3)
+        return float(values[0]), np.asarray(modes[:, 0])
 
     def _objective(self, z: Floats, weight: float) -> tuple[float, Floats]:
         look()

@@ -1,4 +1,4 @@
-"""The trusted form of theory, (6.9) and (12.7), by which a solution is the only one, in 2D and 3D.
+"""The trusted form of theory, (6.9), by which a solution is the only one, in 2D and 3D.
 
 At one alpha, over a piece, and of a body that nothing holds it differs in the system and the rows that are handed in
 only: ``UniqueForm`` is definite for all changes of the forces, ``RootForm`` (theory, section 14.11) for those that are
@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Generic, Self, TypeVar
 
 import numpy as np
 
-from enumsol.arithmetic.balls import SAFE, TINY, UNIT, Ball, dense_eigenvalue_bound, upper_norm
+from enumsol.arithmetic.balls import SAFE, TINY, UNIT, Ball, least_eigenvalue, upper_norm
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -63,7 +63,7 @@ class Multipliers:
         return form
 
     def taken(self, S: Ball, off: Floats, lost: Floats) -> Ball:
-        """The most that a theta which is off takes from the form (theory, (6.9), (7.18) and (12.8)).
+        """The most that a theta which is off takes from the form (theory, section 6.11 and (7.18)).
 
         ``lost``: any positive numbers where ``off`` is positive; elsewhere both are 0.
         """
@@ -440,11 +440,6 @@ def _table(W: Ball, P: Ball, least: float) -> Ball | None:
 def _sizes(rows: Ball) -> Floats:
     """Upper bounds of the norms of rows; 0 where a row is."""
     return np.where(_used(rows), upper_norm(rows.size, axis=1), 0.0) if len(rows.mid) else np.zeros(0)
-
-
-def least_eigenvalue(M: Ball) -> float:
-    """Lower bound of the smallest eigenvalue of symmetric matrices; at most 0 where none positive is proven."""
-    return (dense_eigenvalue_bound(M.mid) - float(upper_norm(M.rad))) / SAFE if M.finite else 0.0
 
 
 def _lacks(M: Ball) -> float:

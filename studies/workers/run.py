@@ -1,14 +1,16 @@
 """How much faster are several workers than one, and what does it cost to share a search?
 
 Searched is a wedge that jams (4 by p / 2, pull (4e-4, 1e-3), alpha 2.2; five roots), verified and with its proof,
-without workers and by process pools of one, two and more processes, started before the clock. Every size is searched
+without workers and by one, two and more: of a process pool, and of a cluster of Dask on this machine (``dask``; ``dask,
+unwatched`` where its workers do not sample their own stacks), all started before the clock. Every size is searched
 ``--repeat`` times in turn, and the shortest time of each counts. ``cpu`` is the time of all processes in which they
 compute, with the start of the workers; more than without workers is what sharing costs.
 
-Read ``times one`` (how many times as fast as one worker). The proofs of all numbers of workers must be the same file.
-Nothing else may run on the machine, and threads of linear algebra must be off (OMP_NUM_THREADS=1).
+Read ``efficiency`` (the time without workers, divided by the time and the number of workers). The proofs of all numbers
+of workers of a kind must be the same file. Nothing else may run on the machine, and threads of linear algebra must be
+off (OMP_NUM_THREADS=1).
 
-``--size 64 --repeat 1`` is a search of a minute and a half with one worker. ``calling`` is the part of ``cpu`` that the
+``--size 64 --repeat 1`` is a search of two minutes. ``calling`` is the part of ``cpu`` that the
 calling process takes, which puts the proof together: what it takes on a machine that has no more processors than there
 are workers these have to do without.
 
@@ -24,10 +26,13 @@ import os
 import resource
 import time
 from concurrent.futures import ProcessPoolExecutor
+from contextlib import contextmanager
 from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING
 
+import dask
 import numpy as np
+from distributed import Client, LocalCluster
 
 import enumsol
 from workers.sharing import rows_of as shared_rows
@@ -37,6 +42,7 @@ if TYPE_CHECKING:
 
 #: Contact nodes of the wedge: a minute or so, and a second.
 SIZE, SMOKE_SIZE = 48, 16
+KINDS = "pool", "dask", "dask, unwatched"
 
 
 def options(parser):
@@ -51,37 +57,51 @@ def cpu():
     return np.array([usage.ru_utime + usage.ru_stime for usage in usages])
 
 
-def search(problem, workers, path):
+@contextmanager
+def crew(kind, workers):
+    """An executor whose workers are there, and have imported what they need; None without workers."""
+    if not workers:
+        yield None
+    elif kind == "pool":
+        with ProcessPoolExecutor(workers, mp_context=multiprocessing.get_context("spawn")) as pool:
+            list(pool.map(_warm, range(4 * workers)))
+            yield pool
+    else:
+        with (
+            dask.config.set({"distributed.worker.profile.enabled": kind == "dask"}),
+            LocalCluster(n_workers=workers, threads_per_worker=1, dashboard_address=":0") as cluster,
+            Client(cluster) as client,
+        ):
+            client.gather(client.map(_warm, range(4 * workers), pure=False))
+            yield client
+
+
+def search(problem, kind, workers, path):
     """Root set, seconds, and seconds of this process and of workers; no workers: in this process."""
     before = cpu()
-    if not workers:
+    with crew(kind, workers) as executor:
         started = time.perf_counter()
-        roots = enumsol.enumerate_roots(problem, 2.2, proof_path=path)
-        return roots, time.perf_counter() - started, cpu() - before
-    with ProcessPoolExecutor(workers, mp_context=multiprocessing.get_context("spawn")) as pool:
-        # all of them are there, and have imported what they need
-        list(pool.map(_warm, range(4 * workers)))
-        started = time.perf_counter()
-        roots = enumsol.enumerate_roots(problem, 2.2, proof_path=path, executor=pool)
+        roots = enumsol.enumerate_roots(problem, 2.2, proof_path=path, executor=executor)
         seconds = time.perf_counter() - started
     return roots, seconds, cpu() - before
 
 
 def _warm(_):
-    import enumsol.search.parallel  # noqa: F401 (in the worker)
+    import enumsol.search.setup  # noqa: F401 (in the worker)
 
     time.sleep(0.05)
 
 
-def row(problem, workers, repeat, folder):
+def row(problem, kind, workers, repeat, folder):
     """The shortest of several searches."""
     path = f"{folder}/{workers}.proof"
-    found = [search(problem, workers, path) for _ in range(repeat)]
+    found = [search(problem, kind, workers, path) for _ in range(repeat)]
     roots, seconds, (calling, others) = min(found, key=lambda entry: entry[1])
     with open(path, "rb") as file:
         digest = hashlib.file_digest(file, "sha256").hexdigest()[:12]
     return {
         "p": problem.p,
+        "kind": kind if workers else "none",
         "workers": workers or "none",
         "nodes": roots.stats.nodes,
         "roots": len(roots),
@@ -95,14 +115,16 @@ def row(problem, workers, repeat, folder):
 
 
 def rows_of(size, counts, repeat):
-    """Searches of one wedge without workers and with each number of them."""
+    """Searches of one wedge without workers, and with each number of them of every kind."""
     problem = enumsol.gallery.wedge(4, size // 2, pull=(4e-4, 1e-3))
     problem.condensed  # noqa: B018 (made once, outside the clock)
     with TemporaryDirectory() as folder:
-        rows = [row(problem, workers, repeat, folder) for workers in (0, *counts)]
-    one = next((entry["seconds"] for entry in rows if entry["workers"] == 1), rows[0]["seconds"])
+        rows = [row(problem, "none", 0, repeat, folder)]
+        rows += [row(problem, kind, workers, repeat, folder) for kind in KINDS for workers in counts]
     for entry in rows:
-        entry["times one"] = one / entry["seconds"]
+        entry["efficiency"] = rows[0]["seconds"] / (
+            entry["seconds"] * (entry["workers"] if entry["kind"] != "none" else 1)
+        )
     return rows
 
 
@@ -112,7 +134,8 @@ def main(run: Run) -> None:
     counts = getattr(run.options, "workers", [1, 2])
     load = os.getloadavg()[0] if hasattr(os, "getloadavg") else float("nan")
     rows = [entry for size in sizes for entry in rows_of(size, counts, repeat)]
-    proofs = {(entry["p"], entry["proof"]) for entry in rows if entry["workers"] != "none"}
+    # tasks of a cluster are longer than those of a pool, and proofs follow the tasks
+    proofs = {(entry["p"], entry["kind"][:4], entry["proof"]) for entry in rows if entry["workers"] != "none"}
     right = all(entry["complete"] and entry["accepted"] for entry in rows)
     run.table(
         "workers",
@@ -120,7 +143,7 @@ def main(run: Run) -> None:
         f"{os.cpu_count()} processors; the shortest of {repeat}",
         f"load of the machine before, which should be near 0: {load:.1f}",
         f"all complete and checked: {'yes' if right else 'no'}; one proof whatever the number of workers: "
-        f"{'yes' if len(proofs) == len(sizes) else 'no'}",
+        f"{'yes' if len(proofs) == 2 * len(sizes) else 'no'}",
     )
     shared = [row for size in sizes for row in shared_rows(enumsol.gallery.wedge(4, size // 2, pull=(4e-4, 1e-3)), 2.2)]
     most = [row for row in shared if row["workers"] == max(entry["workers"] for entry in shared)]

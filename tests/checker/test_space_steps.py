@@ -1,6 +1,6 @@
 """Forged proofs in 3D whose steps have two numbers for the components of one tangential force.
 
-Zeros of such a natural map are no solutions (theory, (12.10) and (12.16)): the proofs say that they are all there are.
+Zeros of such a natural map are no solutions (theory, (12.10)): the proofs say that they are all there are.
 """
 
 from fractions import Fraction

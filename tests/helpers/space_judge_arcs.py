@@ -59,7 +59,7 @@ def _contracts(E, radii):
 
 
 def bend(natural, around, d, e):
-    """Bounds of the second derivative of alpha along a smooth curve (theory, (12.24))."""
+    """Bounds of the second derivative of alpha along a smooth curve (theory, (12.26))."""
     first, Y, E = slope(natural, around, d, e)
     z, alpha = around.z[:-1], around.z[-1]
     moved = [dot(row, first) for row in natural.Z]

@@ -1,6 +1,6 @@
 """Boxes that hold one solution in 3D, or one curve of them over alpha, for space_judge, in balls of many digits.
 
-The solutions are the zeros of y - P(y + rho w) (theory, (12.10) and (12.16)); P takes lambda_n to max(lambda_n,
+The solutions are the zeros of y - P(y + rho w) (theory, (12.10)); P takes lambda_n to max(lambda_n,
 0) and tau to the disc. Two zeros in a set differ by a vector in the kernel of some mean derivative there: where all of
 these are regular there is one at most. A zero is shown to exist in a narrow set around the one that Newton's method
 finds. Boxes are those of zeta = y - steps w (docs/proof_format.md).
@@ -317,7 +317,7 @@ class NaturalMap:
         return Around(z, self.Z, moved, spread)
 
     def bordered(self, around, e, statuses=None):
-        """Over balls of (z, alpha): Y near an inverse of B, E, G and V of (12.13), B and terms Y D Z."""
+        """Over balls of (z, alpha): Y near an inverse of B, E, G and V of (12.14), B and terms Y D Z."""
         rows, U, V, terms = self.equations(around, e, statuses)
         middle = arb_mat(rows)
         for u, v in zip(U, V, strict=True):

@@ -117,7 +117,7 @@ def natural_map(system, steps=None):
 
 
 def only_solution(weights, start):
-    """[6.5] y and w of the only solution, near a point, where its statuses are not said (theory, (12.9))."""
+    """[6.5] y and w of the only solution, near a point, where its statuses are not said (theory, (6.10))."""
     system = weights.system
     natural = natural_map(system)
     try:

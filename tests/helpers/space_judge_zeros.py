@@ -147,7 +147,7 @@ def with_one_free(system, codes, angles, alpha):
 
 
 def free_bounds(system, free, alpha):
-    """Of a component of x: by the energy bound (theory, (12.5)), or of the rigid displacement."""
+    """Of a component of x: by the energy bound (theory, (12.9)), or of the rigid displacement."""
     if free >= len(system.node_of):
         rho = system.rigid[2][free - len(system.node_of)]
         return arb(0, rho.upper())
@@ -158,7 +158,7 @@ def free_bounds(system, free, alpha):
 
 
 def contradicts(system, codes, angles, alpha):
-    """Whether the equations have no solution within the energy bound (theory, (12.5)), also where M is singular."""
+    """Whether the equations have no solution within the energy bound (theory, (12.9)), also where M is singular."""
     leaf = Leaf.__new__(Leaf)
     leaf.system, leaf.codes, leaf.free = system, codes, None
     leaf.sort()

@@ -102,7 +102,7 @@ def test_coefficients_that_are_no_floats():
 
 
 def test_what_oscillates_is_not_said_to_run_away():
-    """Theory, section 15.1: nothing grows along a straight line, and yet slip and stick in turn do."""
+    """Nothing grows along a straight line, and yet slip and stick in turn do (theory, section 15.1)."""
     from stepping import STICK_SLIP_A as A, STICK_SLIP_F as F
 
     problem = planted(A, np.array([0.0, 0.1]), np.array([1.0, F]), np.array([F]))

@@ -24,11 +24,11 @@ def check_leaving(data):
     stiffness, motions = setting(*data)
     proven = StabilitySearch(stiffness, motions).run()
     assert proven.growing
-    for _, motion in proven.growing:
-        low, high = motion.mu
+    for certificate, motion in proven.growing:
+        low, high = certificate.low, certificate.high
         rho = np.sqrt(0.5 * (low + high))
         K = stiffness.at(low).mid
-        claimed = np.linalg.solve(A + low * M, stiffness.rows.T @ (K @ (motions.moves.mid @ motion.x.mid)))
+        claimed = np.linalg.solve(A + low * M, stiffness.rows.T @ (K @ (motions.moves.mid @ motion.mid)))
         claimed /= np.linalg.norm(claimed)
         # to the last bits: what flutters beside it may grow much faster
         judged = [(v / np.linalg.norm(v), own) for mu, v, own in growing_motions(*data)]
@@ -96,7 +96,7 @@ def test_forty_bodies_that_do_not_run_away():
 
 
 def test_slip_and_stick_in_turn_may_grow():
-    """Theory, section 15.1: what does not run away may be unstable all the same."""
+    """What does not run away may be unstable all the same (theory, section 15.1)."""
     rows, one = np.eye(4), np.ones(1)
     data = STICK_SLIP_A, np.eye(4), rows[:1], rows[1:2], np.array([STICK_SLIP_F]), ["limit"], one
     assert growing_motions(*data) == []

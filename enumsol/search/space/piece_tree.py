@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copy
 from dataclasses import dataclass, replace
 from fractions import Fraction
 from functools import lru_cache, partial
@@ -14,16 +15,16 @@ from enumsol.arithmetic.rationals import simplest
 from enumsol.condensation.space_condensed import AlphaSpace
 from enumsol.model.sectors import DEEPEST, SECTORS, level_of, width_level
 from enumsol.model.statuses import CONTACT, UNDECIDED
-from enumsol.proof.curve_records import CutPiece, OnCurve
+from enumsol.proof.curve_records import OnCurve
 from enumsol.proof.leaves import Excluded
-from enumsol.proof.records import Branching
+from enumsol.proof.records import Branching, CutPiece
 from enumsol.relaxation.engine import PRUNE_MARGIN
 from enumsol.search.outcome import StopReason
 from enumsol.search.parts import Answer, Spread
+from enumsol.search.space.curve_proposals import ERRORS
 from enumsol.search.space.known_curves import Curves, CurveWantedError, around_curves, middle_of, settled, through
 from enumsol.search.space.open_leaves import is_swept
-from enumsol.search.space.piece_certificates import ERRORS, ExaminedPiece, Passage, runs_over
-from enumsol.search.space.piece_multipliers import COUNTED, AlphaPoint, exclusion, unbalanced
+from enumsol.search.space.piece_proposals import THETA, AlphaPoint, ExaminedPiece, Passage, exclusion, runs_over
 from enumsol.search.space.space_fathoming import without_sectors
 from enumsol.search.tree import depth_first
 from enumsol.support.deadlines import TimeOverError, look, remaining
@@ -40,7 +41,6 @@ if TYPE_CHECKING:
     from enumsol.relaxation.space_relaxation import SpaceRelaxation
     from enumsol.search.parts import TreePart
     from enumsol.support.array_types import Codes, Floats
-    from enumsol.trusted.space.curve_runs import CurveChain
 
     #: The record of a node, and its children.
     Done = tuple[Record | "OpenLeaf", list["PieceNode"]]
@@ -279,9 +279,9 @@ class PieceTree:
         """An assignment that one alpha excludes: over all of the piece, if possible, or it is cut or branched."""
         point, relaxation = parent
         rows, values = point.multipliers(relaxation)
-        if at.piece.margin(codes, rows, (values, values), COUNTED) > 0:
+        if at.piece.margin(codes, rows, (values, values), ERRORS) > 0:
             return Excluded(rows, np.stack([values, values])), []
-        if (without := unbalanced(at.piece, codes)) is not None:
+        if (without := at.unbalanced(codes)) is not None:
             return without, []
         ends = self._ends(at, codes)
         possible = [(end, other) for end, other in ends if not _is_excluded(other)]
@@ -390,12 +390,12 @@ class PieceTree:
             return None
         (passage,) = passages
         known, run = self.curves.known[passage.curve], passage.run
-        numbers = at.proposals.numbers(statuses, passage.parts)
-        if numbers is not None and piece.lies_on(known, run, statuses, numbers, ERRORS):
+        numbers = at.numbers(statuses, passage.parts)
+        if numbers is not None and piece.lies_on(known, run, statuses, numbers, THETA):
             before = sum(len(other.chain.links) for other in self.curves.known[: passage.curve])
             return OnCurve(before + run.first, before + run.last, numbers), []
         longer = self._is_longer(piece, _ALONE)
-        if longer and at.proposals.is_hopeful(statuses, known.over(run, piece.middle, piece.middle)):
+        if longer and at.is_hopeful(statuses, known.over(run, piece.middle, piece.middle)):
             # a leaf may be decided over a longer piece
             done = None if {CONTACT, UNDECIDED} & set(codes) else self._leaf(at, codes)
             return self._halved(at, codes) if done is None or isinstance(done[0], OpenLeaf) else done
@@ -451,32 +451,22 @@ class PieceWorker:
 
     Attributes
     ----------
-    enclosure, interval, units, smallest : as PieceTree takes them
-    chains, sampled, final, tried : as Curves takes them
+    enclosure, units, smallest : as PieceTree takes them
+    curves : Curves
+        The curves that are known, and for what further ones were asked.
     """
 
     enclosure: CondensedEnclosure
-    interval: tuple[Fraction, Fraction]
     units: tuple[Floats, Floats]
     smallest: float
-    chains: tuple[CurveChain, ...]
-    sampled: bool
-    final: bool
-    tried: frozenset[tuple[Fraction, Fraction, Codes]]
-
-    @classmethod
-    def of(cls, tree: PieceTree) -> PieceWorker:
-        """Worker for parts of a tree as it is now."""
-        curves = tree.curves
-        chains, tried = tuple(known.chain for known in curves.known), frozenset(curves.tried)
-        given = tree.space.enclosure, tree.interval, tree.units, tree.smallest
-        return cls(*given, chains, curves.sampled, curves.final, tried)
+    curves: Curves
 
     def examined(self, roots: Sequence[PieceNode], nodes: int) -> Answer:
         """Examine so many nodes, until the time is over or a curve is wanted."""
-        enclosure, interval = self.enclosure, self.interval
-        curves = Curves(enclosure, interval, self.chains, sampled=self.sampled, final=self.final, tried=self.tried)
-        tree = PieceTree(enclosure, interval, self.units, curves, smallest=self.smallest)
+        # as they were sent, whatever was asked for in an earlier task
+        curves = copy.copy(self.curves)
+        curves.tried = set(curves.tried)
+        tree = PieceTree(self.enclosure, curves.interval, self.units, curves, smallest=self.smallest)
         waiting = tree.examined(roots, nodes)
         rest = [item.sent() for item in waiting]
         return Answer(tree.records, tree.nodes, tree.covered, rest, tree.wanted is not None)
@@ -516,7 +506,8 @@ class SpreadPieces(Spread):
 
     def _worker(self) -> PieceWorker:
         self._sent = self._state
-        return PieceWorker.of(self._pieces)
+        tree = self._pieces
+        return PieceWorker(tree.space.enclosure, tree.units, tree.smallest, tree.curves)
 
     def _is_current(self, *, afresh: bool) -> bool:
         del afresh

@@ -10,7 +10,7 @@ from enumsol.model import sectors
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from enumsol.support.array_types import Indices
+    from enumsol.support.array_types import Floats, Indices
 
 
 OPEN, STICK, SLIP_PLUS, SLIP_MINUS, FRICTIONLESS, CONTACT, UNDECIDED = range(7)
@@ -39,7 +39,7 @@ def sector_children(code: int, tangents: int) -> tuple[int, ...]:
 
 
 def is_sector_covering(code: int, children: Sequence[int], tangents: int) -> bool:
-    """Whether statuses, in any order, cover a partial one: those of ``sector_children``, or any parts of a sector."""
+    """True if statuses, in any order, cover a partial one: those of ``sector_children``, or any parts of a sector."""
     if code <= sectors.SECTORS:
         return bool(children) and sorted(children) == sorted(sector_children(code, tangents))
     numbers = [child - sectors.SECTORS for child in children]
@@ -62,9 +62,28 @@ def is_within(code: int, over: int) -> bool:
     return both and sectors.contains(over - sectors.SECTORS, code - sectors.SECTORS)
 
 
+def leaf_code(code: int, tau: Sequence[int], towards: Sequence[float] | Floats, level: int) -> int:
+    """The code of a node in a leaf, by its status: open, stick, and any other one for contact with slip.
+
+    Parameters
+    ----------
+    tau : places of both components, -1 where there is none
+    towards : (2,), of friction over its coefficients, or of the slip
+    level : of the sector
+    """
+    occurs = [k for k in range(2) if tau[k] >= 0]
+    if code == OPEN or not occurs:
+        return OPEN if code == OPEN else FRICTIONLESS
+    if code == STICK:
+        return STICK
+    if len(occurs) == 1:
+        return SLIP_PLUS if towards[occurs[0]] > 0 else SLIP_MINUS
+    return sectors.SECTORS + sectors.holding(towards, level)
+
+
 @lru_cache(maxsize=_KEPT)
 def row_sign(code: int, row: Row) -> int:
-    """What the multiplier of a row may be at a node of this code."""
+    """Sign that the multiplier of a row may have at a node of this code."""
     kind, _, number = row
     if kind == GAP:
         return NONNEGATIVE if code in (OPEN, UNDECIDED) else FREE
