@@ -144,7 +144,7 @@ class ByCurves:
         try:
             with within(limits):
                 curves = Curves(self._given, self.interval)
-                tree = PieceTree(self.enclosure, self.interval, self._units(), curves, max_nodes, tick)
+                tree = PieceTree(self.enclosure, self._units(), curves, max_nodes, tick)
                 self._search(tree, tree if executor is None else SpreadPieces(executor, tree))
             self.stop = None if tree.stopped is None else Stop(tree.stopped, self.nodes)
         except NotEnclosedError as error:

@@ -119,10 +119,10 @@ class PieceTree:
     ----------
     enclosure : CondensedEnclosure
         The problem's own.
-    interval : (a, b), Fractions
     units : force and length, (p,) arrays of powers of two
     curves : Curves
-        Those that are known. Where the search would go on with another one it comes back, and says so in ``wanted``.
+        Those that are known over the interval. Where the search would go on with another one it comes back, and says so
+        in ``wanted``.
     max_nodes : int, optional
     tick : callable, optional
         Called with the share of the tree that is done, every child of a node being as large as the others.
@@ -148,14 +148,14 @@ class PieceTree:
     def __init__(
         self,
         enclosure: CondensedEnclosure,
-        interval: tuple[Fraction, Fraction],
         units: tuple[Floats, Floats],
         curves: Curves,
         max_nodes: int | None = None,
         tick: Callable[[float], object] | None = None,
         smallest: float = 2.0**-30,
     ) -> None:
-        self.interval, self.curves, self.units, self.smallest = interval, curves, units, smallest
+        interval = self.interval = curves.interval
+        self.curves, self.units, self.smallest = curves, units, smallest
         self.space = AlphaSpace(enclosure, sum(interval, Fraction(0)) / 2, units)
         self._most, self._tick = max_nodes, tick
         self._least = Fraction(smallest) * (interval[1] - interval[0])
@@ -466,7 +466,7 @@ class PieceWorker:
         # as they were sent, whatever was asked for in an earlier task
         curves = copy.copy(self.curves)
         curves.tried = set(curves.tried)
-        tree = PieceTree(self.enclosure, curves.interval, self.units, curves, smallest=self.smallest)
+        tree = PieceTree(self.enclosure, self.units, curves, smallest=self.smallest)
         waiting = tree.examined(roots, nodes)
         rest = [item.sent() for item in waiting]
         return Answer(tree.records, tree.nodes, tree.covered, rest, tree.wanted is not None)
