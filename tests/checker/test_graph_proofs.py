@@ -7,6 +7,7 @@ import pytest
 from complete import accepted_report, whole_graph
 from graph_proofs import GRAPHS, graph as made
 from proof_tools import of_kind, proof_of
+from rational_checker import check_records
 
 from enumsol import branch_graph, enumerate_roots, gallery, verify
 from enumsol.branches.proof_records import trees
@@ -103,5 +104,7 @@ def test_a_selection_that_survives_over_a_piece_and_over_its_half():
     half = [["q", [[0]], [1.0] * 3, []], records[place]]
     halves = [x for ends in (["0", "1"], ["1", "2"]) for x in ({**records[begin], "piece": ends}, *half)]
     changed = [*records[:place], ["p", "1"], *records[place + 1 : end], *halves, *records[end:-1]]
-    report = accepted_report(problem, proof_of([*changed, {**records[-1], "pieces": 4, "leaves": 5}]))
+    changed += [{**records[-1], "pieces": 4, "leaves": 5}]
+    report = accepted_report(problem, proof_of(changed))
     assert (report.complete, report.arcs, report.closed) == (True, 4, 0)
+    assert check_records(problem, changed) == report.selections
