@@ -16,6 +16,7 @@ from trees import by_the_tree, forms_at_once
 
 from enumsol import ContactProblem3D, enumerate_roots, verify
 from enumsol.checker.space_checker import SpaceChecker
+from enumsol.checker.walk import TreeCell
 
 
 def solved(A, B):
@@ -219,7 +220,7 @@ def test_exclusions_by_a_form_hold_in_rationals_and_no_others_are_accepted():
             for _ in range(6):
                 values = values_of(records[k])
                 values[int(rng.integers(len(values)))] *= float(rng.choice((0.0, 0.5, 1.01, 2.0, -1.0)))
-                accepted = checker._leaf(codes[k], in_file([*with_values(records[k], values)[:3], 1])) is None
+                accepted = checker._leaf(TreeCell(codes[k]), in_file([*with_values(records[k], values)[:3], 1])) is None
                 bound = form and space.bound(codes[k], rows, values, *units, form)
                 assert accepted == (bound is not None and bound > 0)
                 counts[accepted] += 1
@@ -247,7 +248,7 @@ def test_what_is_accepted_of_changed_multipliers_holds_in_rationals():
                     number = int(rng.integers(4, 40)) + run
                     a, b = arc_of_sector(number)
                     rows[j][2] = number if floor(4 * a) == ceil(4 * b) - 1 else rows[j][2]
-                accepted = checker._leaf(codes[k], in_file(with_values(["x", rows, ""], values))) is None
+                accepted = checker._leaf(TreeCell(codes[k]), in_file(with_values(["x", rows, ""], values))) is None
                 bound = space.bound(codes[k], rows, values, *units)
                 assert accepted == (bound is not None and bound > 0)
                 counts[accepted] += 1

@@ -16,6 +16,7 @@ from space_graph_proofs import Parts, closed_branch, mutant
 from space_judge_mutants import checked, judged
 
 from enumsol.branches.space.space_graph import ByCurves
+from enumsol.support.deadlines import Deadline
 
 
 def orthotropic(p, seed):
@@ -48,7 +49,7 @@ def proven(name):
     """Problem, proof and records of a graph that leaves nothing open."""
     build, low, high = CASES[name]
     cover = ByCurves(build(), (Fraction(low), Fraction(high)))
-    cover.search(max_nodes=700)
+    cover.run(700, Deadline(), None, None)
     proof = cover.proof()
     return cover.problem, proof, records_of(proof)
 

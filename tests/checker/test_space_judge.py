@@ -21,6 +21,7 @@ from space_proofs import RANDOM, case, random_problem, values_of, with_values
 from enumsol import Proof, branch_graph, enumerate_roots, gallery
 from enumsol.branches.space.space_graph import ByCurves
 from enumsol.search.space import space_references
+from enumsol.support.deadlines import Deadline
 
 #: What the checker says of a claim that is true and that its own bounds do not reach.
 COARSE = (
@@ -101,7 +102,7 @@ def graph_of(kind, *rest):
     interval = 0, 1
     if kind == "curves cut short":
         cover = ByCurves(random_over_alpha(*rest), (Fraction(0), Fraction(1, 64)))
-        cover.search(max_nodes=5)
+        cover.run(5, Deadline(), None, None)
         return cover.problem, cover.proof()
     if kind == "one node":
         problem = OneNode(*rest).problem

@@ -15,6 +15,7 @@ from enumsol.arithmetic.balls import Ball
 from enumsol.branches.space.space_graph import ByCurves
 from enumsol.condensation.space_condensed import AlphaSpace
 from enumsol.search.space.piece_proposals import ExaminedPiece, runs_over
+from enumsol.support.deadlines import Deadline
 from enumsol.trusted.space import curve_runs
 from enumsol.trusted.space.curve_runs import CurveParts, KnownCurve, LinkRange
 from enumsol.trusted.space.pieces import AlphaPiece
@@ -33,7 +34,7 @@ PIECES = [INTERVAL, (Fraction(1, 3), Fraction(2, 5)), (Fraction(5, 8), Fraction(
 @functools.cache
 def known_curves(p, seed):
     cover = ByCurves(random_over_alpha(p, seed), INTERVAL)
-    cover.search(max_nodes=60)
+    cover.run(60, Deadline(), None, None)
     given = AlphaProblem.of(cover.problem.enclosure)
     return cover, [KnownCurve(given, chain) for chain in cover.chains]
 
