@@ -101,7 +101,7 @@ def test_a_selection_that_survives_over_a_piece_and_over_its_half():
     )
     (place,) = [k for k in of_kind(records, "x") if k > begin]
     (end,) = [k for k, record in enumerate(records) if "traces" in record and "force" in record]
-    half = [["q", [[0]], [1.0] * 3, []], records[place]]
+    half = [["q", [[0]], [1.0, 1.0, 0.0], []], records[place]]
     halves = [x for ends in (["0", "1"], ["1", "2"]) for x in ({**records[begin], "piece": ends}, *half)]
     changed = [*records[:place], ["p", "1"], *records[place + 1 : end], *halves, *records[end:-1]]
     changed += [{**records[-1], "pieces": 4, "leaves": 5}]
