@@ -254,7 +254,7 @@ class ArcChecker:
         """Pieces joined where they touch, cut where g vanishes, with the side of that alpha."""
         merged: list[list[Fraction]] = []
         for a, b in sorted(pieces):
-            if merged and a <= merged[-1][1] and a != self.origin:
+            if merged and (a < merged[-1][1] or a == merged[-1][1] != self.origin):
                 merged[-1][1] = max(b, merged[-1][1])
             else:
                 merged.append([a, b])

@@ -66,6 +66,8 @@ class GraphChecker(TreeWalker[EnclosedPiece]):
     _uncounted: int = 0
     #: Pieces whose solutions are said to lie on arcs, by the places of their forms those of this piece; and the arcs.
     _closed: list[PieceOnArcs] = field(default_factory=list)
+    #: How many pieces have one solution by that alone.
+    _alone: int = 0
     _on_arcs: dict[int, PieceOnArcs] = field(default_factory=dict)
     _arcs: ArcChecker | None = None
     #: The piece and its units; its data, made when there is something to exclude; what it leaves to its halves.
@@ -95,7 +97,7 @@ class GraphChecker(TreeWalker[EnclosedPiece]):
             data=self.data,
             arcs=None if self._arcs is None else len(self._arcs.arcs),
             open=0 if self._arcs is None else self._arcs.open,
-            closed=len(self._closed),
+            closed=self._alone,
         )
 
     def _check(self, records: Iterator[Any]) -> None:
@@ -163,9 +165,13 @@ class GraphChecker(TreeWalker[EnclosedPiece]):
         if ends != (x, y):
             raise reading.RefusedError(f"piece {number} is not the next one: the interval is not covered")
         self.pieces, self._ends, self._units, self._system, self._cut = number, ends, units, None, []
-        self.declared, self._forms, self._on_arcs = [], {}, {}
+        self.declared, self._forms, self._on_arcs, before = [], {}, {}, self._uncounted
         self._walk(records, [TreeCell(codes) for codes in roots])
-        self._closed += [closed for closed in self._on_arcs.values() if closed.leaves]
+        used = [closed for closed in self._on_arcs.values() if closed.leaves]
+        self._closed += used
+        # of a body that nothing holds the form is about its leaves only: here they are all, and none survives or is cut
+        whole = self._uncounted == before and roots == [(UNDECIDED,) * self.problem.p]
+        self._alone += bool(used) and (self.problem.held or whole)
         if self.progress is not None:
             self.progress(self.leaves)
         return self._cut

@@ -162,7 +162,9 @@ def product(left: Floats | sp.csr_array, right: Floats) -> Ball:
     size = np.asarray(abs(left) @ np.abs(right))
     terms = int(np.max(np.diff(sp.csr_array(left).indptr))) if sp.issparse(left) else left.shape[1]
     k = gamma(terms + 2)
-    return Ball(mid, np.where(size > 0, size * k * (1 + 2 * k) * SAFE + TINY, 0.0))
+    # not where ``size`` is zero: it may underflow
+    met = left.astype(bool).astype(np.float64) @ (right != 0)
+    return Ball(mid, np.where(met > 0, size * k * (1 + 2 * k) * SAFE + TINY, 0.0))
 
 
 @dataclass(frozen=True)

@@ -486,7 +486,7 @@ def _references(problem: ProblemData, alpha: Fraction) -> tuple[Floats, Floats]:
     Raises
     ------
     NotEnclosedError
-        The ratio of both changes with alpha, or there is only one, which changes.
+        The ratio of both changes with alpha, or there is only one, which changes; or the other one over- or underflows.
     """
     found = np.zeros((2, problem.p, 2))
     for i, (first, second, ratio) in enumerate(node_friction(problem)):
@@ -496,7 +496,7 @@ def _references(problem: ProblemData, alpha: Fraction) -> tuple[Floats, Floats]:
         reference, k = (Fraction(float(at[0])), 0) if at[0] else (Fraction(float(at[1])), 1)
         found[0, i, k] = float(reference)
         if k == 0 and at[1]:
-            other = nearest([reference * ratio])
+            other = coefficients([reference * ratio])
             found[0, i, 1], found[1, i, 1] = other.mid[0], other.rad[0]
     return found[0], found[1]
 

@@ -302,7 +302,7 @@ class DeclaredForm(Record):
                 return 4 * limits.p, 1
             selection_from(codes, limits.friction)
             return limits.p + 3 * sum(limits.friction), 2
-        if not (whole if limits.held else all(map(is_code_of_leaf, codes))):
+        if limits.tree & Tree.GRAPHS or not (whole if limits.held else all(map(is_code_of_leaf, codes))):
             raise ValueError("it is about no assignment")
         return (limits.p + limits.components, 0) if limits.held else (limits.p + 2 * limits.components, 2)
 

@@ -205,3 +205,26 @@ def test_a_block_on_a_slab_of_more_degrees_of_freedom_than_exact_algebra_takes()
     (arc,) = graph.arcs_at(0.015)
     (root,) = enumsol.enumerate_roots(problem, 0.015)
     assert np.allclose(arc.values(0.015), (root.lambda_n, root.lambda_t), rtol=1e-9, atol=1e-12)
+
+
+def test_what_is_closed_beside_a_selection_that_survives_is_no_piece_with_one_solution():
+    problem, _, records = proven()
+    assert records[9] == ["o", 1, *records[9][2:]]
+    other = replaced(records, 9, ["s"])
+    trace = [["t", [2, 3], 0.25, 0.75, 0], ["w", 0.25, 0.75, 0, [["n", 0.75]]]]
+    counts = {**records[-1], "leaves": 4, "selections": 3, "traces": 3}
+    forged = [*other[:10], {**records[10], "traces": 3}, *other[11:-1], *trace, counts]
+    report = accepted_report(problem, proof_of(forged))
+    assert (report.complete, report.closed, report.arcs) == (True, 0, 2)
+    assert check_records(problem, forged) == report.selections
+    twice = replaced([*records[:3], *records[2:]], 6, ["o", 2, *records[5][2:]])
+    assert accepted_report(problem, proof_of(twice)).closed == 1
+
+
+def test_a_form_of_a_body_that_is_held_is_refused():
+    problem, _, records = proven()
+    for form in (["q", [1, 1], [1.0, 1.0], [1.0, 1.0]], ["q", [6, 6], [0.0] * 8, []]):
+        forged = [*records[:2], form, *records[2:]]
+        assert not enumsol.verify(problem, proof_of(forged)).ok
+        with pytest.raises(Refused):
+            check_records(problem, forged)

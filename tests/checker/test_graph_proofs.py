@@ -6,6 +6,8 @@ import numpy as np
 import pytest
 from complete import accepted_report, whole_graph
 from graph_proofs import GRAPHS, graph as made
+from proof_tools import of_kind, proof_of
+from rational_checker import check_records
 
 from enumsol import branch_graph, enumerate_roots, gallery, verify
 from enumsol.branches.proof_records import trees
@@ -89,3 +91,20 @@ def refined(rng, root, friction):
     node = int(rng.choice(nodes))
     children = children_of(root[node], friction=friction[node])
     return [leaf for c in children for leaf in refined(rng, (*root[:node], c, *root[node + 1 :]), friction)]
+
+
+def test_a_selection_that_survives_over_a_piece_and_over_its_half():
+    """Beside the zero of g, too, where both begin, it is traced once."""
+    problem, records, _ = made("unloaded")
+    begin = next(
+        k for k, record in enumerate(records) if record.__class__ is dict and record.get("piece") == ["0", "2"]
+    )
+    (place,) = [k for k in of_kind(records, "x") if k > begin]
+    (end,) = [k for k, record in enumerate(records) if "traces" in record and "force" in record]
+    half = [["q", [[0]], [1.0, 1.0, 0.0], []], records[place]]
+    halves = [x for ends in (["0", "1"], ["1", "2"]) for x in ({**records[begin], "piece": ends}, *half)]
+    changed = [*records[:place], ["p", "1"], *records[place + 1 : end], *halves, *records[end:-1]]
+    changed += [{**records[-1], "pieces": 4, "leaves": 5}]
+    report = accepted_report(problem, proof_of(changed))
+    assert (report.complete, report.arcs, report.closed) == (True, 4, 0)
+    assert check_records(problem, changed) == report.selections

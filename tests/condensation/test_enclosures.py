@@ -8,10 +8,12 @@ import scipy.sparse as sp
 from exact_balls import holds
 from generators import dense_compliance, fe_compliance, from_condensed
 from oracles import exact_condense
+from problems3d import from_compliance
 
 from enumsol import ContactProblem, gallery
 from enumsol.arithmetic import balls
-from enumsol.condensation.enclosure import CondensedEnclosure, NotEnclosedError
+from enumsol.condensation.enclosure import CondensedEnclosure, NotEnclosedError, product
+from enumsol.condensation.space_condensed import AlphaSpace
 
 
 def units(problem, force=3, length=-2):
@@ -175,3 +177,22 @@ def test_friction_that_underflows_is_refused():
     problem = ContactProblem(np.eye(2), [[1.0, 0.0]], [[0.0, 1.0]], [1.0, 1.0])
     with pytest.raises(NotEnclosedError, match="underflows"):
         problem.enclosure.at(Fraction(1, 10**400), np.ones(2), np.ones(2))
+
+
+@pytest.mark.parametrize("of", [np.array, sp.csr_array])
+def test_products_that_underflow_are_not_exact_zeros(of):
+    left, right = of([[1e-200, 0.0], [1.0, 0.0]]), np.array([[1e-200, 0.0], [3.0, 0.0]])
+    found = product(left, right)
+    assert found.mid[0, 0] == 0
+    assert found.rad[0, 0] > 0
+    assert not np.any(found[:, 1].size)
+
+
+@pytest.mark.parametrize(("coefficient", "ratio", "alpha"), [(1.0, 5e-324, "-9/10"), (1.0, 2.0**1023, "1")])
+def test_a_second_coefficient_over_alpha_that_under_or_overflows_is_refused(coefficient, ratio, alpha):
+    one = np.array([coefficient])
+    problem = from_compliance(np.eye(3), np.ones(3), (one, one * ratio))
+    problem = problem.replace(friction_slope=(one, one * ratio))
+    space = AlphaSpace(CondensedEnclosure.from_problem(problem), Fraction(alpha), (np.ones(1), np.ones(1)))
+    with pytest.raises(NotEnclosedError, match="flows"):
+        _ = space.fixed

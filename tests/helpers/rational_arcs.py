@@ -243,8 +243,8 @@ class Arcs:
         """[7.3, traces] Ends and side."""
         joined = []
         for x, y in sorted(pieces):
-            if joined and joined[-1][1] == x and x != self._origin:
-                joined[-1][1] = y
+            if joined and (x < joined[-1][1] or x == joined[-1][1] != self._origin):
+                joined[-1][1] = max(y, joined[-1][1])
             else:
                 joined.append([x, y])
         return [(x, y, 0 if self._origin is None else 1 if y > self._origin else -1) for x, y in joined]

@@ -234,3 +234,13 @@ def test_a_box_near_a_corner_is_taken_if_a_checker_shows_it_without_a_guess():
         assert curve is None or only_curve(given, curve.box) is not None
         shown += curve is not None
     assert shown
+
+
+@pytest.mark.parametrize("size", [1.0, 1e200])
+def test_a_status_is_certain_only_where_the_bounds_of_the_others_are(size):
+    """A node deep in its cone sticks; where the length of its tangential argument overflows nothing is certain."""
+    z = Ball.exact(np.array([1e3 * size, 0.1 * size, 0.1 * size, 0.5]))
+    with np.errstate(all="ignore"):
+        (status,), (may,) = GIVEN.statuses(z), GIVEN.possible(z)
+    assert STICK in may
+    assert status == (STICK if size == 1.0 else None)

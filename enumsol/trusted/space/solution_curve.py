@@ -246,12 +246,13 @@ class AlphaProblem:
         p, rubs, (least, most) = self.p, np.any(self.places >= 0, axis=1), self.lengths(z)
         gap = Ball(np.zeros(p), np.full(p, np.inf)) if gap is None else gap
         (low, high), (F_low, F_high) = outwards(z[:p]), outwards(self.friction(z[-1]))
-        touches, away = high >= 0, np.abs(gap.mid) > gap.rad * SAFE
-        sticks = touches & rubs & ~(away & (gap.mid > 0)) & (least <= np.maximum(F_high, 0.0) * high * SAFE + TINY)
-        beyond = (F_low < 0) | (most >= F_low * np.maximum(low, 0.0) / SAFE - TINY)
-        slips = touches & rubs & ~(away & (gap.mid < 0)) & beyond
+        # a status is left out where it is refuted: what overflowed refutes nothing
+        touches, away = ~(high < 0), np.abs(gap.mid) > gap.rad * SAFE
+        outside = (away & (gap.mid > 0)) | (least > np.maximum(F_high, 0.0) * high * SAFE + TINY)
+        inside = (away & (gap.mid < 0)) | ((F_low >= 0) & (most < F_low * np.maximum(low, 0.0) / SAFE - TINY))
         codes = OPEN, FRICTIONLESS, STICK, SLIP
-        found = np.column_stack([low <= 0, touches & ~rubs, sticks, slips]).tolist()
+        loaded = touches & rubs
+        found = np.column_stack([~(low > 0), touches & ~rubs, loaded & ~outside, loaded & ~inside]).tolist()
         return tuple(frozenset(code for code, may in zip(codes, node, strict=True) if may) for node in found)
 
     def statuses(self, z: Ball) -> tuple[int | None, ...]:
