@@ -93,6 +93,8 @@ class SpaceGraphChecker(GraphChecker):
         if record != {"tree": True}:
             raise RefusedError("the tree over alpha is missing")
         low, high = self.interval
+        # conditions of leaves and curves are those within the bound of the rigid displacement
+        self.bounded = not self.problem.held
         curves = [KnownCurve(given, chain) for chain in self.curves]
         self._boxes = [(known, k) for known in curves for k in range(len(known.chain.links))]
         self._over = AlphaPiece(AlphaSpace(enclosure, (low + high) / 2, units), low, high)

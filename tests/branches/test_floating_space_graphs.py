@@ -169,6 +169,13 @@ def test_files_frames_figures_and_workers(small, tmp_path):
     assert_same(spread, graph, "steps")
 
 
+def test_a_verified_graph_is_about_bounded_rigid_displacements(small):
+    problem, graph = small
+    report = enumsol.verify(problem, graph.proof)
+    assert report.within == problem.rigid_reach == 30.0
+    assert "within rigid displacements of 30" in repr(report)
+
+
 @pytest.mark.slow
 def test_bodies_on_weak_springs_tend_to_it(small):
     problem, graph = small
