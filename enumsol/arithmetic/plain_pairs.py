@@ -1,4 +1,4 @@
-"""What the compiled `enumsol.arithmetic._balls` has, where it is missing: every operation is left to numpy."""
+"""Replacement of `enumsol.arithmetic._balls` where nothing is compiled: every operation is left to numpy."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
 
 class Pair:
-    """What a ball consists of; the operations are those of a subclass."""
+    """Midpoint and radius of a ball; the operations are those of a subclass."""
 
     __slots__ = ("mid", "rad")
 

@@ -89,7 +89,7 @@ class ClaimedArc:
 
 
 @dataclass(eq=False)
-class ClosedPiece:
+class PieceOnArcs:
     """A piece whose solutions are said to lie on the arcs through it.
 
     Attributes
@@ -109,7 +109,7 @@ class ClosedPiece:
     bounded: bool = False
 
     @classmethod
-    def read(cls, a: Fraction, b: Fraction, record: list[Any], p: int, *, held: bool) -> ClosedPiece:
+    def read(cls, a: Fraction, b: Fraction, record: list[Any], p: int, *, held: bool) -> PieceOnArcs:
         """From its record."""
         expected = _ENTRIES if held else _FLOATING_ENTRIES
         if len(record) != expected:
@@ -207,7 +207,7 @@ class ArcChecker:
         The alpha at which g vanishes, if it lies in the interval.
     pieces : mapping of codes to lists of (Fraction, Fraction)
         Where selections survive.
-    closed : sequence of ClosedPiece
+    closed : sequence of PieceOnArcs
         Pieces whose solutions are said to lie on the arcs through them.
     fail : called with a sentence for every failure
 
@@ -227,7 +227,7 @@ class ArcChecker:
         interval: tuple[Fraction, Fraction],
         origin: Fraction | None,
         pieces: Mapping[Codes, list[tuple[Fraction, Fraction]]],
-        closed: Sequence[ClosedPiece],
+        closed: Sequence[PieceOnArcs],
         fail: Callable[[str], None],
     ) -> None:
         self._problem, self._enclosure, self._interval, self._origin = problem, enclosure, interval, origin

@@ -25,7 +25,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from enumsol.checker.arcs import ArcChecker, ClosedPiece
+from enumsol.checker.arcs import ArcChecker, PieceOnArcs
 from enumsol.checker.reports import GraphVerificationReport
 from enumsol.checker.walk import ProofChecker
 from enumsol.condensation.enclosure import CondensedEnclosure
@@ -92,7 +92,7 @@ class PieceLeaves:
     #: multipliers of the form declared last, and the piece with it
     declared: Floats | None = None
     with_form: EnclosedPiece | None = None
-    closed: ClosedPiece | None = None
+    closed: PieceOnArcs | None = None
 
     def declare(self, record: list[Any]) -> None:
         """Read a form."""
@@ -129,7 +129,7 @@ class GraphChecker(ProofChecker):
         self.pieces = self.leaves = 0
         self.selections: set[bytes] = set()
         self._handed: dict[tuple[int, ...], list[tuple[Fraction, Fraction]]] = {}
-        self._closed: list[ClosedPiece] = []
+        self._closed: list[PieceOnArcs] = []
         self.interval: tuple[Fraction, Fraction] | None = None
         #: A piece has leaves of a tree that is not all left to its halves.
         self._in_trees = False
@@ -289,7 +289,7 @@ class GraphChecker(ProofChecker):
                 raise ValueError("it is decided by its arcs twice")
             if len(piece.leaves("x")):  # of those before it is not known whether they need the bound
                 raise ValueError("it is decided by its arcs, but leaves without a solution are before that")
-            piece.closed = ClosedPiece.read(piece.a, piece.b, batch[0], self.problem.p, held=self.problem.held)
+            piece.closed = PieceOnArcs.read(piece.a, piece.b, batch[0], self.problem.p, held=self.problem.held)
             batch = batch[1:]
         if piece.closed is not None and not self.problem.held:
             batch = [record for record in batch if not self._read_beside_arcs(piece.closed, record)]
@@ -320,7 +320,7 @@ class GraphChecker(ProofChecker):
                     margins = exclusion_margins(within.unbounded, Leaves.of(codes[empty], terms))
                     piece.closed.bounded = not np.all(margins > 0)
 
-    def _read_beside_arcs(self, closed: ClosedPiece, record: list[Any]) -> bool:
+    def _read_beside_arcs(self, closed: PieceOnArcs, record: list[Any]) -> bool:
         """Keep a leaf below which there is nothing beside the arcs; False if the record is none."""
         size, kind = _BESIDE_ARCS.get(record[0] if record and isinstance(record[0], str) else "", (0, None))
         if kind is None:

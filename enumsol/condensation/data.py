@@ -1,4 +1,4 @@
-"""What condensing asks of a contact problem; ``enumsol.model.problem.ContactProblem`` is one.
+"""Data of a contact problem that condensing needs; ``enumsol.model.problem.ContactProblem`` is one.
 
 Friction and load at an alpha are computed here without rounding: whether one is zero, or negative, is decided with
 these values.

@@ -100,7 +100,7 @@ class ExactSystem:
 
 
 class UncondensedSystem:
-    """The same at one alpha, condensed only where S or g is asked for: to solve one selection takes neither.
+    """Problem at one alpha in rationals, condensed only where S or g is asked for: one selection takes neither.
 
     S has as many digits as det A, and 2p columns; the equations of one selection have the digits of the data and one
     right-hand side.

@@ -78,7 +78,7 @@ _SENTENCES = {
 
 
 class Follower(Generic[_Path]):
-    """One continuation.
+    """State of a continuation.
 
     Parameters
     ----------

@@ -33,7 +33,7 @@ MIN_FRACTION = 2.0**-12
 
 @dataclass(frozen=True)
 class NewtonIteration:
-    """One iteration of the piecewise smooth Newton method.
+    """Iteration of the piecewise smooth Newton method.
 
     Attributes
     ----------

@@ -136,7 +136,7 @@ RIGID = "rigid_coordinates"
 
 
 class PointKind(TextEnum):
-    """How a path came to a point; members compare with their texts."""
+    """Ways to come to a point of a path; members compare with their texts."""
 
     START = "start"
     #: An accepted step of the paper's Algorithm 5.1; the others were located.
@@ -166,7 +166,7 @@ class PathStatus(TextEnum):
 
 @dataclass(frozen=True)
 class PathPoint(Sealed):
-    """One point of a path.
+    """Point of a path.
 
     Attributes
     ----------
@@ -225,7 +225,7 @@ class Transition:
 
 @dataclass(frozen=True)
 class PathStats:
-    """What the step control did.
+    """Statistics of the step control.
 
     Attributes
     ----------

@@ -43,7 +43,7 @@ _CONVERGED = 1e-13
 
 
 @dataclass(frozen=True)
-class Pair:
+class PairOfParts:
     """Two parts of the boundary that may touch.
 
     Attributes
@@ -59,7 +59,7 @@ class Pair:
     gap: float | None = None
 
     @classmethod
-    def of(cls, value: Sequence[Any], option: str = "pairs") -> Pair:
+    def of(cls, value: Sequence[Any], option: str = "pairs") -> PairOfParts:
         """The pair given by two names, or by two names and a gap (of a tie the largest one).
 
         Raises
@@ -79,7 +79,7 @@ class Pair:
         return cls(names[0], names[1], gap)
 
     @classmethod
-    def all_of(cls, value: object) -> list[Pair]:
+    def all_of(cls, value: object) -> list[PairOfParts]:
         """Every pair of a list.
 
         Raises
@@ -111,7 +111,7 @@ class Group:
     ----------
     parts : list of str
         Contact parts, or the first part of a pair.
-    pair : Pair or None
+    pair : PairOfParts or None
     normals : (k, d) array
         Of the boundary, out of the body, also where an obstacle gives the normals of the rows.
     count, missed, shared : int
@@ -119,7 +119,7 @@ class Group:
     """
 
     parts: list[str]
-    pair: Pair | None
+    pair: PairOfParts | None
     normals: Floats
     count: int
     missed: int = 0
@@ -192,11 +192,11 @@ def contacts_of(body: NodalBasis, mesh: PartedMesh, options: Options, held: Supp
         There are no parts, one does not exist or is not on the boundary, or there is a node that cannot be one: held in
         some components only, without a normal, or at the centre of an obstacle; or no node of a pair faces anything.
     """
-    parts, pairs = names_of(options.contact, "contact"), Pair.all_of(options.pairs)
+    parts, pairs = names_of(options.contact, "contact"), PairOfParts.all_of(options.pairs)
     if not parts and not pairs:
         raise InvalidArgumentError("contact names no part; expected the contact boundary, or pairs")
     found: list[tuple[ContactRows, Floats, Group]] = []
-    groups: list[tuple[list[str], Pair | None]] = [(parts, None)] if parts else []
+    groups: list[tuple[list[str], PairOfParts | None]] = [(parts, None)] if parts else []
     groups += [([pair.slave], pair) for pair in pairs]
     on: dict[str, Integers] = {}
     areas, taken = [], np.zeros(0, dtype=np.int64)
@@ -250,7 +250,7 @@ def _group(
     facets: Integers,
     held: Supports,
     obstacle: object,
-    pair: Pair | None,
+    pair: PairOfParts | None,
     taken: Integers,
 ) -> tuple[ContactRows, Floats, Group]:
     """Contact nodes with their normals on some facets, and the distances to what they face."""
@@ -303,7 +303,7 @@ def _touching(body: NodalBasis, part: str, facets: Integers) -> Integers:
 
 
 def _paired(
-    body: NodalBasis, mesh: PartedMesh, touching: Integers, normals: Floats, held: Supports, pair: Pair
+    body: NodalBasis, mesh: PartedMesh, touching: Integers, normals: Floats, held: Supports, pair: PairOfParts
 ) -> tuple[ContactRows, Floats, Group]:
     """Nodes that face the other part of a pair, relative to it."""
     apart = ~np.isin(touching, mesh.part(pair.master))  # of both, as at the tip of a crack: in contact with itself
@@ -333,7 +333,7 @@ def facing(
     return faced(mesh.points, nodes, normals, facets, outward, others)
 
 
-def facing_normals(body: NodalBasis, mesh: PartedMesh, pair: Pair) -> tuple[Integers, Floats]:
+def facing_normals(body: NodalBasis, mesh: PartedMesh, pair: PairOfParts) -> tuple[Integers, Floats]:
     """All nodes of the first part, and the means of the normals of the facets around them, which corners have as well.
 
     Of nodes without facets they are those of `normals_against`.

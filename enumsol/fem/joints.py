@@ -16,7 +16,7 @@ import scipy.sparse as sp
 from enumsol.errors import InvalidArgumentError
 from enumsol.fem.conditions import by_part, displacements_of, fix, frames_of, names_of
 from enumsol.fem.constraints import Equation, eliminated
-from enumsol.fem.contacts import Pair, facing, facing_normals
+from enumsol.fem.contacts import PairOfParts, facing, facing_normals
 from enumsol.support.arguments import finite_number, shown
 from enumsol.support.array_arguments import short_vector
 
@@ -243,7 +243,7 @@ def _spread(name: str, dofs: Integers, nodes: Integers, weights: Floats, motions
 
 
 def _tie(body: NodalBasis, mesh: PartedMesh, value: Any, found: Joints) -> None:
-    pair = Pair.of(value, "tie")
+    pair = PairOfParts.of(value, "tie")
     nodes, normals = facing_normals(body, mesh, pair)
     apart = ~np.isin(nodes, mesh.nodes(pair.master))
     nodes, normals = nodes[apart], normals[apart]

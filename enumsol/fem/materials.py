@@ -37,7 +37,7 @@ _INDEFINITE = 1e-9
 
 
 @dataclass(frozen=True)
-class Material:
+class BodyMaterial:
     """Moduli of all cells, or of each.
 
     Attributes
@@ -113,7 +113,7 @@ def nodes_on_axis(points: Floats) -> Integers:
     return np.flatnonzero(points[:, 0] <= SAME * float(np.max(np.abs(points))))
 
 
-def material_of(mesh: PartedMesh, options: Options) -> Material:
+def material_of(mesh: PartedMesh, options: Options) -> BodyMaterial:
     """Material of a body.
 
     Raises
@@ -142,7 +142,7 @@ def material_of(mesh: PartedMesh, options: Options) -> Material:
     known = {constants: _moduli(*constants, solid=solid) for constants in dict.fromkeys(each)}
     elasticity, coefficients, thermal = (np.array([known[constants][k] for constants in each]) for k in range(3))
     plain = others is True and not is_axisymmetric(mesh, options)
-    return Material(
+    return BodyMaterial(
         elasticity[0] if one else elasticity,
         (coefficients[0] if one else coefficients) if plain else None,
         np.broadcast_to(thermal, (len(mesh.cells), thermal.shape[1])) if options.expansion is not None else None,
@@ -316,7 +316,7 @@ class Temperature:
 
 
 def thermal_forces(
-    body: NodalBasis, mesh: PartedMesh, options: Options, material: Material, others: Floats, slope: str = ""
+    body: NodalBasis, mesh: PartedMesh, options: Options, material: BodyMaterial, others: Floats, slope: str = ""
 ) -> tuple[Floats, Floats | None]:
     """Nodal forces (N, d) of thermal strains and ``others``, and the stresses (M, s) of the body with no displacement.
 

@@ -40,7 +40,7 @@ def mesh_of(source: object, groups: str | None = None) -> PartedMesh:
 
 
 def in_folder(source: object, folder: Path) -> Any:
-    """What a file in this folder says of its mesh, with paths from the folder.
+    """Description of a mesh by a file in this folder, with paths from the folder.
 
     Raises
     ------
@@ -87,7 +87,7 @@ def _rotation(value: object, name: str, dimension: int) -> Floats:
 
 
 def _together(meshes: Mapping[str, PartedMesh]) -> PartedMesh:
-    """One mesh of several: names of parts begin with those of the meshes, which are parts of the body as well."""
+    """Several meshes as one: names of parts begin with those of the meshes, which are parts of the body as well."""
     dimensions = {mesh.points.shape[1] for mesh in meshes.values()}
     if len(dimensions) > 1:
         raise InvalidArgumentError("mesh has plane meshes and meshes in 3D; expected one or the other")

@@ -65,7 +65,7 @@ class Supports:
 
 @dataclass(frozen=True)
 class ContactRows:
-    """What the p contact rows stand for.
+    """Meaning of the p contact rows.
 
     Attributes
     ----------

@@ -1,4 +1,4 @@
-"""What reveals a wrong scene: refusals and notes, each in one sentence."""
+"""Signs of a wrong scene: refusals and notes, each in one sentence."""
 
 from __future__ import annotations
 

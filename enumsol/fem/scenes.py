@@ -38,7 +38,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from enumsol.fem.conditions import Coefficients
-    from enumsol.fem.materials import Material
+    from enumsol.fem.materials import BodyMaterial
     from enumsol.fem.restrained import ContactRows
     from enumsol.model.problem3d import AnyProblem
 
@@ -66,7 +66,7 @@ class Scene:
         On all nodes, and their derivatives with respect to alpha [force].
     springs : (m, m) csc_array
         Of all displacements, those of reference points after those of nodes.
-    material : Material
+    material : BodyMaterial
     pieces : list of BodyPiece
         The connected bodies.
     masses : (M,) array or None
@@ -91,7 +91,7 @@ class Scene:
     forces: Floats
     slope: Floats
     springs: sp.csc_array
-    material: Material
+    material: BodyMaterial
     pieces: list[BodyPiece]
     masses: Floats | None = None
     stress: Floats | None = None

@@ -1,4 +1,4 @@
-"""What successive approximations ended with, and its file."""
+"""Result of successive approximations, and its file."""
 
 from __future__ import annotations
 
@@ -52,7 +52,7 @@ def _check_shapes(arrays: dict[str, Floats], body: Problem, path: str) -> None:
 
 
 class Outcome(enum.Enum):
-    """How successive approximations ended."""
+    """Outcomes of successive approximations."""
 
     CONVERGED = "converged"
     ROUNDING = "rounding"

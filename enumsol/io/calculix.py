@@ -335,7 +335,7 @@ def _written(pictures: list[Any], numbers: Integers | None) -> Iterator[str]:
 
 
 def _is_body(picture: Any, k: int) -> bool:
-    """Whether a block of cells is of the body, not the facets of its contact surface."""
+    """True if a block of cells is of the body, not the facets of its contact surface."""
     surface = picture.cell_data.get("contact_surface")
     return surface is None or not np.any(surface[k])
 

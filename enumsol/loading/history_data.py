@@ -1,4 +1,4 @@
-"""What a history found, as plain data and as text: its stages, their graph, and what is proven of it.
+"""Results of a history, as plain data and as text: its stages, their graph, and what is proven of it.
 
 A stage holds the roots of one step from one start, and where each of them leaves the contact nodes. The proof of a
 history is one file: the proofs of its searches, with their starts and what follows them.
@@ -200,7 +200,7 @@ START: Node = (0, 0)
 
 @dataclass(frozen=True)
 class Refinement:
-    """What halving the increments changed.
+    """Result of halving the increments.
 
     Attributes
     ----------
@@ -232,7 +232,7 @@ class Refinement:
 
 @dataclass(frozen=True, eq=False)
 class HistoryData:
-    """What was searched.
+    """Data of all histories over load steps.
 
     Attributes
     ----------

@@ -428,7 +428,7 @@ class MapFold:
 
 @dataclass(frozen=True)
 class MapRow:
-    """What is proven at one value of the second parameter: a branch graph over alpha, in numbers.
+    """Row of a map, for one value of the second parameter: a branch graph over alpha, in numbers.
 
     Attributes
     ----------

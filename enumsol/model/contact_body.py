@@ -1,4 +1,4 @@
-"""What contact problems in 2D and 3D share: stiffness, contact rows, gap, load path, labels, and their validation."""
+"""Common part of contact problems in 2D and 3D: stiffness, contact rows, gap, load path, labels, validation."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What a problem keeps of its discretization: the mesh, for pictures, files and norms."""
+"""Discretization of a problem, as far as it is kept: the mesh, for pictures, files and norms."""
 
 from __future__ import annotations
 

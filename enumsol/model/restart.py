@@ -1,4 +1,4 @@
-"""The same body in the next step of a history: another load, friction and slip offset, on the factors of the first."""
+"""A body in the next step of a history: another load, friction and slip offset, on the factors of the first."""
 
 from __future__ import annotations
 

@@ -34,7 +34,7 @@ _AZIMUTHS, _ELEVATIONS, _USUAL, _PREFERRED = range(-180, 180, 15), (-35, -20, 20
 
 @dataclass(frozen=True)
 class BodyShape:
-    """What a picture of a problem with a mesh needs, whatever the solution.
+    """Shapes that a picture of a problem with a mesh needs, whatever the solution.
 
     Attributes
     ----------

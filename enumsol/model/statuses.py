@@ -14,7 +14,7 @@ from enumsol.support.array_types import Floats, Mask, NDArray
 
 
 class ContactStatus(enum.Enum):
-    """What a contact node does: it is open, it sticks, or it slips; in 2D in the positive or negative direction.
+    """Status of a contact node: it is open, it sticks, or it slips; in 2D in the positive or negative direction.
 
     Examples
     --------

@@ -93,7 +93,7 @@ class Undecided(Sealed):
 
 @dataclass(frozen=True)
 class SearchStats:
-    """What the enumeration did.
+    """Statistics of an enumeration.
 
     Attributes
     ----------

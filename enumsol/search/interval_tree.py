@@ -79,7 +79,7 @@ class Subtree:
 
 @dataclass
 class TreeResult:
-    """What one tree over a piece came to; together its parts cover all selections below its roots.
+    """Result of one tree over a piece; together its parts cover all selections below its roots.
 
     Attributes
     ----------

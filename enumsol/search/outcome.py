@@ -75,7 +75,7 @@ class SearchLimits:
 
 @dataclass
 class SearchOutcome:
-    """What a search found; filled while it runs, so that an interruption loses nothing."""
+    """Results of a search; filled while it runs, so that an interruption loses nothing."""
 
     solutions: list[SelectionSolution] = field(default_factory=list)
     undecided: list[UndecidedPart] = field(default_factory=list)

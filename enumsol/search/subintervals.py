@@ -58,7 +58,7 @@ class Piece:
 
 @dataclass
 class SearchedPiece:
-    """What the trees over one piece left: together the leaves cover all selections below ``roots``.
+    """Result of the trees over one piece: together the leaves cover all selections below ``roots``.
 
     Attributes
     ----------
@@ -158,7 +158,7 @@ class Task:
         return [Task(Piece(*half), tuple(cut)) for half in itertools.pairwise(ends)] if cut else []
 
 
-class Worker:
+class IntervalWorker:
     """Searches trees over pieces of an interval.
 
     Parameters
@@ -234,7 +234,7 @@ class IntervalSearch:
     Attributes
     ----------
     interval : (Fraction, Fraction)
-    worker : Worker
+    worker : IntervalWorker
     pieces : list of SearchedPiece
         In the order of their trees: the halves come directly after what was cut.
     nodes : int
@@ -258,7 +258,7 @@ class IntervalSearch:
         deadline: float | None = None,
         progress: Callable[[float], object] | None = None,
     ) -> None:
-        self.worker = Worker(condensed, interval, origin, leaves)
+        self.worker = IntervalWorker(condensed, interval, origin, leaves)
         self._p, self._origin = len(condensed.F0), origin
         self.interval, self.progress = interval, progress
         self.max_nodes, self.deadline = max_nodes, deadline
@@ -470,7 +470,7 @@ def _search_tree(packed: bytes, task: Task, seconds: float | None) -> TreeResult
     """Search one tree, in a worker; every thread has a searcher of its own, and keeps it for the next tree."""
     if getattr(_local, "packed", None) != packed:
         _local.worker, _local.packed = pickle.loads(packed), packed
-    worker: Worker = _local.worker
+    worker: IntervalWorker = _local.worker
     return worker.run(task, deadline=None if seconds is None else time.perf_counter() + seconds)
 
 

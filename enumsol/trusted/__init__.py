@@ -1,1 +1,1 @@
-"""What search and checker both trust: rows of a status, exclusions, verified selections."""
+"""Tests that search and checker both trust: rows of a status, exclusions, verified selections."""

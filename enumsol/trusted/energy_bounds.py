@@ -42,7 +42,7 @@ def energy_bounds(
 
 
 def _energy_bounds(system: EnclosedSystem, y: Floats, c: Floats, c_rad: Floats, errors: float) -> Floats:
-    """The same by theory, (6.2) and (6.3)."""
+    """Lower bounds of the energy by theory, (6.2) and (6.3)."""
     S, g = system.S, system.g
     # every inner product of up to 2p terms below is off by at most k times that of the absolute values
     k = gamma(4 * len(g) + 16)
@@ -84,7 +84,7 @@ class EnergyForm:
 
     @classmethod
     def of(cls, system: EnclosedSystem) -> EnergyForm:
-        """That of an enclosed problem."""
+        """The energy of an enclosed problem."""
         own = system.inverse, system.form_error, system.smallest_eigenvalue
         return cls(system, system.S, system.g, system.g_rad, *own)
 

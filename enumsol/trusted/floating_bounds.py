@@ -57,7 +57,7 @@ def floating_bounds(ends: Sequence[EnclosedSystem], y: Floats, c: Floats, c_rad:
 
 
 def _bend(found: Sequence[tuple[EnclosedSystem, Floats, Floats, Mask]], z: Sequence[Floats]) -> Floats:
-    """How far the bound may sag between two ends, (m,), for multipliers that are affine in alpha."""
+    """Bounds of the sag between two ends, (m,), for multipliers that are affine in alpha."""
     (one, y0, change0, _), (other, y1, change1, _) = found
     k = gamma(len(one.g) + len(one.reach) + 8)
     turned = np.abs(y1 - y0) + change0 + change1
@@ -143,7 +143,7 @@ def balanced(G: Ball, h: Ball, y: Floats, errors: float = 1.0) -> tuple[Floats, 
 
 
 def is_unbalanced(system: EnclosedSystem, codes: Sequence[int], z: Floats) -> bool:
-    """Whether no forces below a partial assignment are in balance with the load, by z (r,); see theory, (14.7).
+    """True if no forces below a partial assignment are in balance with the load, by z (r,); see theory, (14.7).
 
     z'h > 0, and z'G lambda <= 0 for the forces that span those of every node: (1, F) or (1, -F), or (1, 0) where F = 0.
     """
@@ -220,7 +220,7 @@ def without_bound(system: EnclosedSystem) -> EnclosedSystem:
 
 
 def is_confined(system: EnclosedSystem) -> bool:
-    """Whether it is proven that no solution has a coordinate of its rigid displacement beyond its bound."""
+    """True if it is proven that no solution has a coordinate of its rigid displacement beyond its bound."""
     try:
         with np.errstate(over="ignore", invalid="ignore"):
             return _Cells(system).all_excluded()
@@ -238,7 +238,7 @@ def motion_against(system: EnclosedSystem, codes: Sequence[int], other: Enclosed
 
 
 def motion_beside(system: EnclosedSystem, resultants: Sequence[Floats]) -> Floats:
-    """As ``motion_against``, for forces whose resultants are combinations of these with positive coefficients."""
+    """``motion_against`` for forces whose resultants are combinations of these with positive coefficients."""
     h = system.rows.h.mid
     size = float(np.linalg.norm(h))
     rays = [ray for ray in resultants if np.any(ray)]
@@ -325,7 +325,7 @@ class _Cells:
         return np.asarray(max(load, 0.0) / least * SAFE)
 
     def all_excluded(self) -> bool:
-        """Whether every cell is shown to hold no solution."""
+        """True if every cell is shown to hold no solution."""
         r = len(self._reach)
         waiting = []
         for face in range(r):
@@ -350,7 +350,7 @@ class _Cells:
         return not waiting
 
     def _is_excluded(self, low: Floats, high: Floats) -> bool:
-        """Whether a cell holds no solution."""
+        """True if a cell holds no solution."""
         p, middle, half = self._p, 0.5 * (low + high), 0.5 * (high - low)
         # the ends of cells are few binary digits: these sums round nothing
         centre = middle @ self._G

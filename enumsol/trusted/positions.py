@@ -1,4 +1,4 @@
-"""Where the contact nodes are at a root: the start of the next step of a history (theory, section 13.2)."""
+"""Positions of the contact nodes at a root: the start of the next step of a history (theory, section 13.2)."""
 
 from __future__ import annotations
 

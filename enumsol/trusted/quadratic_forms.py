@@ -44,7 +44,7 @@ class Equations:
 
     @classmethod
     def of(cls, system: EnclosedSystem, codes: Sequence[int]) -> Equations:
-        """Those that the statuses impose, node by node."""
+        """Equations that the statuses impose, node by node."""
         p, status = system.p, np.asarray(codes, dtype=np.intp)
         still = np.flatnonzero((status == UNDECIDED) & (system.F == 0))
         closed, held = np.flatnonzero((status != OPEN) & (status != UNDECIDED)), np.flatnonzero(status == STICK)

@@ -1,4 +1,4 @@
-"""Whether a strict root of a body that nothing holds is the only one below an assignment (theory, section 14.11)."""
+"""Test that a strict root of a body that nothing holds is the only one below an assignment (theory, section 14.11)."""
 
 from __future__ import annotations
 

@@ -55,12 +55,12 @@ _ROWS = np.array(
 
 
 def row_table() -> NDArray[np.int8]:
-    """What the multipliers may be, by status code (9: undecided with F = 0) and kind of row, shape (10, 7)."""
+    """Signs that multipliers may have, by status code (9: undecided with F = 0) and kind of row, shape (10, 7)."""
     return _ROWS.copy()
 
 
 def row_signs(codes: Indices, F: Floats) -> NDArray[np.int8]:
-    """What the multipliers of all rows may be, shape (..., p, 7), for (partial) status codes of shape (..., p)."""
+    """Signs that multipliers of all rows may have, shape (..., p, 7), for (partial) status codes of shape (..., p)."""
     return np.asarray(_ROWS[np.where((codes == UNDECIDED) & (F == 0), STILL, codes)])
 
 
@@ -101,7 +101,7 @@ def coverings_of(code: int, *, friction: bool) -> tuple[tuple[int, ...], ...]:
 
 
 def is_covering(code: int, children: Sequence[int], *, friction: bool) -> bool:
-    """Whether statuses, in any order, are a way to split a partial one."""
+    """True if statuses, in any order, are a way to split a partial one."""
     return sorted(children) in map(sorted, coverings_of(code, friction=friction))
 
 
@@ -111,5 +111,5 @@ def final_codes(friction: bool) -> tuple[int, ...]:
 
 
 def refines(code: int, partial: int) -> bool:
-    """Whether a (partial) status is part of another one."""
+    """True if a (partial) status is part of another one."""
     return partial in (code, UNDECIDED) or code in _CHILDREN.get(partial, ())

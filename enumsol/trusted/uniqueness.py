@@ -122,7 +122,7 @@ class Weights:
         return replace(self, slope=Ball(ratio, np.where(told, 0.0, self.slope.rad)))
 
     def beyond(self, k: int, gap: float, up: float, down: float) -> float:
-        """What w_t of a node that is open is too large for the numbers, if -w_n >= gap and -down <= w_t <= up."""
+        """Excess of w_t of an open node over what the numbers allow, if -w_n >= gap and -down <= w_t <= up."""
         excess = 0.0
         for side, size in ((1.0, up), (-1.0, down)):
             left = (1.0 - side * self.share[k]) * self.kappa[k] * self.friction.size[k] * SAFE
@@ -133,7 +133,7 @@ class Weights:
         return float(excess * SAFE)
 
     def off(self, k: int, n: Ball, t: Ball, w_n: Ball, w_t: Ball) -> float:
-        """How far theta is at most from one that serves a solution within a node's balls; infinite if that is open."""
+        """Distance of theta at most from one that serves a solution within a node's balls; infinite if that is open."""
         share, F = float(self.share[k]), self.friction[k]
         slips = np.sign(w_t.mid) if abs(w_t.mid) > w_t.rad else 0.0
         if self.tau[k] > 0 or (slips and share == slips):
@@ -152,7 +152,7 @@ class Weights:
         return float(apart.size / low * SAFE)
 
     def distances(self, at: Unknowns, x: Ball, w: Ball) -> Floats:
-        """How far theta is at most from one that serves a solution within balls, (m,); infinite where that is open."""
+        """Distances of theta at most from one that serves a solution within balls, (m,); infinite where open."""
         found, t = np.zeros(len(self.mu)), at.tangential
         for k, n in enumerate(self.normal):
             found[n] = self.off(k, x[n], x[t[n]], w[n], w[t[n]])
@@ -313,7 +313,7 @@ def only_solution(
 def same_solution(
     one: Codes, one_possible: Sequence[frozenset[int]], other: Codes, other_possible: Sequence[frozenset[int]]
 ) -> bool | None:
-    """Whether two solutions, each the only one of its core, are the same; None where that is open.
+    """True if two solutions, each the only one of its core, are the same; None where that is open.
 
     The solution of one core solves that of another if it has the statuses of its fixed nodes. A solution in a complete
     selection is one whose core is complete.
@@ -432,7 +432,7 @@ class Reduced(Components):
 
     @staticmethod
     def _slides(code: int, values: Floats, radii: Floats) -> tuple[float, float]:
-        """What tells that a sliding node slips in its direction or is open, with its radius."""
+        """Condition by which a sliding node slips in its direction or is open, with its radius."""
         forward = 5 if code == FORWARD else 6
         separate, slips = (values[4], radii[4]), (values[forward], radii[forward])
         if values[4] > radii[4]:
@@ -522,7 +522,7 @@ def _allowed(
     rows: Indices,
     values: Floats,
 ) -> bool:
-    """Whether the squares that do not vanish below the assignment are no more than what the form leaves out."""
+    """True if the squares that do not vanish below the assignment are no more than what the form leaves out."""
     system, p, status = part.system, part.system.p, np.array(codes)
     normal, tangential = strengths
     if not np.all(np.isfinite(strengths)) or np.any(strengths < 0) or np.any(tangential[status != STICK] > 0):

@@ -207,6 +207,14 @@ def test_what_the_checkers_load_is_listed():
         assert f"`{module.removeprefix('enumsol.')}`" in listed()
 
 
+def test_what_is_listed_exists():
+    modules = re.findall(r"`((?:trusted|condensation|arithmetic|proof|model|support|checker)\.[\w.]+)`", listed())
+    assert len(modules) > 50
+    assert not [
+        name for name in modules if not path_of(f"enumsol.{name}") and not path_of(f"enumsol.{name.rpartition('.')[0]}")
+    ]
+
+
 def test_what_the_search_uses_of_what_is_trusted_is_listed():
     used = {}
     for file in ROOT.rglob("*.py"):

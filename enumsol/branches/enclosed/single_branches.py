@@ -22,7 +22,7 @@ from enumsol.search.interval_tree import EmptyLeaf, Subtree
 from enumsol.search.reduction import WeightSource
 from enumsol.search.reference_closer import NUMBERS, Cover, OnlyRoot
 from enumsol.search.solvers import Solvers
-from enumsol.search.subintervals import ClosedPiece, Piece, Task, Worker, whole_pieces
+from enumsol.search.subintervals import ClosedPiece, IntervalWorker, Piece, Task, whole_pieces
 from enumsol.selections.float_selections import SIGN_TOLERANCE
 from enumsol.support.deadlines import look
 from enumsol.trusted.arcs.only_branch import branch_references, only_roots
@@ -73,7 +73,7 @@ class ClosedPieces:
     pieces: dict[Piece, ClosedPiece] = field(default_factory=dict)
     traces: list[Trace] = field(default_factory=list)
 
-    def find(self, traced: TracedProblem, worker: Worker | None = None) -> None:
+    def find(self, traced: TracedProblem, worker: IntervalWorker | None = None) -> None:
         """Find those of a problem, with a worker for what of a body that nothing holds needs a tree.
 
         Raises
@@ -162,10 +162,10 @@ class _Proposals:
     ----------
     traced : TracedProblem
     whole : Piece
-    worker : Worker or None
+    worker : IntervalWorker or None
     """
 
-    def __init__(self, traced: TracedProblem, whole: Piece, worker: Worker | None) -> None:
+    def __init__(self, traced: TracedProblem, whole: Piece, worker: IntervalWorker | None) -> None:
         self._traced, self._whole, self._worker = traced, whole, worker
         self._side = traced.spans([(whole.a, whole.b)])[0][2]
         held = traced.problem.held

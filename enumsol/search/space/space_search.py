@@ -114,7 +114,7 @@ class SpaceSplitting:
 
 
 def _towards(code: int, vector: np.ndarray) -> float:
-    """How much a vector points into the middle of a sector."""
+    """Component of a vector along the middle direction of a sector."""
     number = code - SECTORS
     middle = np.add(direction(number), direction(end_number(number)))
     return float(middle @ vector / np.linalg.norm(middle))
@@ -279,7 +279,7 @@ class SpaceCertifier(Certifier):
         return found
 
     def _placed(self, codes: Codes, root: SpaceRoot) -> SpaceRoot:
-        """The same root from sectors around it: its numbers then do not depend on how the search came to its leaf."""
+        """A root, settled anew from sectors around it, so that its numbers do not depend on the way to its leaf."""
         there = list(codes)
         turning = [i for i, code in enumerate(codes) if code > SECTORS]
         for i, (x, y) in zip(turning, turned_by(root.centre, root.angle)[0].tolist(), strict=True):

@@ -39,7 +39,7 @@ def sector_children(code: int, tangents: int) -> tuple[int, ...]:
 
 
 def is_sector_covering(code: int, children: Sequence[int], tangents: int) -> bool:
-    """Whether statuses, in any order, cover a partial one: those of ``sector_children``, or any parts of a sector."""
+    """True if statuses, in any order, cover a partial one: those of ``sector_children``, or any parts of a sector."""
     if code <= sectors.SECTORS:
         return bool(children) and sorted(children) == sorted(sector_children(code, tangents))
     numbers = [child - sectors.SECTORS for child in children]
@@ -64,7 +64,7 @@ def is_within(code: int, over: int) -> bool:
 
 @lru_cache(maxsize=_KEPT)
 def row_sign(code: int, row: Row) -> int:
-    """What the multiplier of a row may be at a node of this code."""
+    """Sign that the multiplier of a row may have at a node of this code."""
     kind, _, number = row
     if kind == GAP:
         return NONNEGATIVE if code in (OPEN, UNDECIDED) else FREE
