@@ -66,8 +66,7 @@ from .fixed_points import (
     successive_approximations as successive_approximations,
 )
 from .io import read_problem as read_problem, write_problem as write_problem
-from .io.calculix import read_results as read_results, write_frd as write_frd
-from .io.deck_starts import write_start as write_start
+from .io.calculix import read_results as read_results, write_frd as write_frd, write_start as write_start
 from .io.vtu import write_vtu as write_vtu
 from .loading.growing import HistoryProgress as HistoryProgress, histories as histories
 from .loading.history import History as History

@@ -218,18 +218,6 @@ def test_a_broken_reference_in_a_source_is_found():
     assert complaints == ["theory has no section 99", "theory has no equation (5.99)"]
 
 
-def test_names_in_the_table_of_changes_are_in_the_files_beside_them():
-    text = (ROOT / "docs" / "architecture.md").read_text(encoding="utf-8")
-    rows = [line for line in text.splitlines() if line.startswith("| ") and "`enumsol/" in line]
-    assert len(rows) > 8
-    for row in rows:
-        files = [ROOT / name for name in re.findall(r"`(enumsol/[\w./]+)`", row)]
-        sources = "".join(path.read_text(encoding="utf-8") for path in files if path.is_file())
-        names = re.findall(r"`(\w+)`", row)
-        made = r"^ *(?:c?def|class)\b.*\b{0}\b|^[A-Z_, ]*\b{0}\b.* = "
-        assert [name for name in names if not re.search(made.format(name), sources, re.MULTILINE)] == [], row
-
-
 def recipes():
     """The recipes of docs/architecture.md and those of CONTRIBUTING.md, by their titles."""
     found = {}

@@ -77,7 +77,7 @@ def test_a_problem_in_2d_loads_nothing_of_3d(tmp_path):
     loaded = modules_after(code)
     assert "meshio" not in loaded
     modules = {name.removeprefix("enumsol.") for name in loaded if name.startswith("enumsol.")}
-    assert {"search.parallel", "search.solvers", "roots.enumeration"} <= modules
+    assert {"search.parts", "search.solvers", "roots.enumeration"} <= modules
     of_space = {"model.sectors", "model.problem3d"}
     assert all((Path(enumsol.__file__).parent / f"{name.replace(chr(46), chr(47))}.py").exists() for name in of_space)
     assert not modules & of_space

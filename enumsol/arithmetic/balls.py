@@ -7,6 +7,7 @@ be used. A ball is a pair of arrays (midpoint, radius), and `Ball` has both, wit
 from __future__ import annotations
 
 from dataclasses import dataclass
+from fractions import Fraction
 from typing import TYPE_CHECKING, Any, SupportsIndex
 
 import numpy as np
@@ -168,6 +169,11 @@ def _smallest_eigenvalue(S: Array) -> float:
         x = cho_solve((L, True), x / size, check_finite=False)
         size = np.linalg.norm(x)
     return float(1.0 / size)
+
+
+def least_eigenvalue(M: Ball) -> float:
+    """Lower bound of the smallest eigenvalue of symmetric matrices; at most 0 where none positive is proven."""
+    return (dense_eigenvalue_bound(M.mid) - float(upper_norm(M.rad))) / SAFE if M.finite else 0.0
 
 
 def sparse_eigenvalue_bound(A: sp.csc_array, estimate: float) -> float:
@@ -333,6 +339,19 @@ def _of_radii(one: Array, other: Array) -> Any:
     """A product, which is not formed where one factor is zero and the other bounded: many matrices are exact."""
     idle = any(not np.any(a) and np.all(np.isfinite(b)) for a, b in ((one, other), (other, one)))
     return 0.0 if idle else one @ other
+
+
+def nearest(exact: Sequence[Fraction]) -> Ball:
+    """Balls around the floats next to numbers, of radius zero where these are floats and unbounded beyond them."""
+    mid, rad = np.zeros(len(exact)), np.zeros(len(exact))
+    for i, number in enumerate(exact):
+        try:
+            mid[i] = value = float(number)
+        except OverflowError:
+            rad[i] = np.inf
+        else:
+            rad[i] = 0.0 if Fraction(value) == number else 2 * UNIT * abs(value) + TINY
+    return Ball(mid, rad)
 
 
 def smaller(one: Ball, other: Ball) -> Ball:

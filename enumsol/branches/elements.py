@@ -18,7 +18,7 @@ from enumsol.roots.local_branch import ContactState
 from enumsol.roots.root import RootFamily, summary
 from enumsol.search.outcome import StopReason
 from enumsol.support.arguments import alpha_value
-from enumsol.support.deadlines import Deadline, Limited, TimeOverError, look, within
+from enumsol.support.deadlines import Deadline, TimeOverError, look, within
 from enumsol.support.messages import TextEnum
 
 if TYPE_CHECKING:
@@ -490,7 +490,7 @@ class Effort:
     Attributes
     ----------
     tick : callable, optional
-    limits : Limited
+    limits : Deadline
         What is not worked out by this deadline is left out.
     ended : StopReason, optional
         Reason for a bound of the work: the call was ended, and only little more of what it found is worked out.
@@ -499,7 +499,7 @@ class Effort:
     """
 
     tick: Tick | None = None
-    limits: Limited = field(default_factory=Deadline)
+    limits: Deadline = field(default_factory=Deadline)
     ended: StopReason | None = None
     most: int | None = None
 

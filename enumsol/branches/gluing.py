@@ -33,8 +33,7 @@ from enumsol.branches.elements import (
 )
 from enumsol.branches.known_selections import KnownSelections
 from enumsol.model.statuses import FINAL, OPEN, RowKind, contact_status
-from enumsol.roots.builder import polytope
-from enumsol.roots.components import RootComponent, connected_components
+from enumsol.roots.components import RootComponent, connected_components, polytope
 from enumsol.roots.local_branch import named_statuses, sign_over
 from enumsol.roots.root import Polytope, RootFamily
 from enumsol.search.outcome import Stop, StopReason

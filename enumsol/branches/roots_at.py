@@ -9,8 +9,7 @@ from enumsol.arithmetic.rationals import rational
 from enumsol.condensation.data import exactly_at
 from enumsol.model.problem import ContactProblem
 from enumsol.model.statuses import FRICTIONLESS, OPEN
-from enumsol.roots.builder import RootBuilder, in_order, root_family
-from enumsol.roots.components import connected_components
+from enumsol.roots.components import RootBuilder, connected_components, in_order, root_family
 from enumsol.roots.enumerate import roots_of_selections
 from enumsol.roots.root_set import RootSet, SearchStats
 from enumsol.search.outcome import Stop, StopReason

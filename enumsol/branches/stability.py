@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from enumsol.roots.stability import Stabilities, rate_bounds
-from enumsol.search.growing_motions import GrowingMotions
+from enumsol.search.growing_motions import crossing_near, zero_near
 from enumsol.search.stability import Proven, StabilitySearch
 from enumsol.support.deadlines import look
 from enumsol.trusted.motions_of_body import friction_over
@@ -32,8 +32,6 @@ if TYPE_CHECKING:
 _PARTS, _SHORTEST = 160, 2.0**-12
 #: Parts that are left then are searched as a whole, with at most so many programs, until that fails so often.
 _PROGRAMS, _FAILURES = 20, 16
-#: Growing motions of a range of alpha are looked for between such powers of two: K(mu) is enclosed at few mu then.
-_GRIDS = (1 / 32, 1 / 8, 1 / 2)
 
 
 @dataclass(frozen=True)
@@ -175,13 +173,14 @@ def _extended(proven: Proven, setting: Setting) -> bool | tuple[float, float]:
     """A proof at one alpha, if it holds for a range of them."""
     stiffness, motions = setting.stiffness, setting.motions
     for tried, _ in proven.growing:
-        crossing = GrowingMotions(stiffness, motions).crossing_near(tried)
+        crossing = crossing_near(stiffness, motions, tried)
         if crossing is not None:
             return rate_bounds(crossing.low, crossing.high)
-        at = GrowingMotions(stiffness, motions).zero_near(tried)
+        at = zero_near(stiffness, motions, tried)
         if at is None:
             continue
-        for step in _GRIDS:
+        # between such powers of two motions are looked for, so that K(mu) is enclosed at few mu
+        for step in (1 / 32, 1 / 8, 1 / 2):
             place = float(np.log2(at)) / step
             below = np.floor(place - 0.25)
             low, high = (float(np.exp2(step * (below + k))) for k in (0, 1 if place - below < 0.75 else 2))

@@ -27,7 +27,7 @@ from enumsol.model.statuses import OPEN, SLIP_MINUS, SLIP_PLUS, STICK
 from enumsol.search.certifiers.interval_certifiers import ExactIntervalCertifier, VerifiedIntervalCertifier
 from enumsol.search.outcome import Stop, StopReason
 from enumsol.search.subintervals import IntervalCertifier, IntervalSearch, on_weak_springs, run_parallel
-from enumsol.support.deadlines import Deadline, Limited, TimeOverError, over, within
+from enumsol.support.deadlines import Deadline, TimeOverError, over, within
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
@@ -132,7 +132,7 @@ class PlaneWay:
         return None if self.exact is None else self.exact.zero
 
     def begin(
-        self, max_nodes: int | None = None, limits: Limited | None = None, tick: Tick | None = None
+        self, max_nodes: int | None = None, limits: Deadline | None = None, tick: Tick | None = None
     ) -> IntervalSearch:
         """The search over the interval; of what nothing holds, on weak springs (theory, section 14.8)."""
         problem, deadline = self.problem, None if limits is None else limits.deadline

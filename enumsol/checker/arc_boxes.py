@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from fractions import Fraction
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
@@ -13,6 +13,7 @@ from enumsol.trusted.arcs.over_parts import OverInterval, expansions, over_parts
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Sequence
 
+    from enumsol.support.array_types import Codes
     from enumsol.trusted.arcs.selection_balls import ArcSelection
 
     #: A part as it is in the proof, and both its ends.
@@ -24,26 +25,27 @@ _ENTRIES = {"h": 3, "n": 2, "e": 7, "u": 2}
 _BOXES, _PARTS = 256, 2048
 
 
+@dataclass
 class BoxSelection:
     """A selection in both arithmetics.
 
-    Parameters
+    Attributes
     ----------
-    precise : has the problem in many digits as ``precise_system``
+    owner : has the problem in many digits as ``precise_system``
     plain : ArcSelection
     side : int
     """
 
-    def __init__(self, precise: Any, plain: ArcSelection, side: int) -> None:
-        self._owner, self.plain, self._side = precise, plain, side
+    owner: Any
+    plain: ArcSelection
+    side: int
 
     @cached_property
     def precise(self) -> Any:
         """The selection in many digits."""
         from enumsol.trusted.arcs.precise import PreciseSelection  # python-flint, not for all proofs
 
-        system = self._owner.precise_system
-        system = system.constant_load(float(self._side)) if self._side else system
+        system = self.owner.precise_system.beside_zero(float(self.side))
         return PreciseSelection(system, self.plain.rows.codes)
 
     @property
@@ -74,18 +76,18 @@ class _Box:
     said: list[Said]
 
 
+@dataclass
 class Boxes:
     """Boxes to be tested.
 
-    Parameters
+    Attributes
     ----------
     fail : called with a sentence for every claim that is not proven
     """
 
-    def __init__(self, fail: Callable[[str], None]) -> None:
-        self._fail = fail
-        self._waiting: list[_Box] = []
-        self._parts = 0
+    fail: Callable[[str], None]
+    _waiting: list[_Box] = field(default_factory=list)
+    _parts: int = 0
 
     def add(self, selection: BoxSelection, low: object, high: object, said: list[Said], *, precise: bool) -> None:
         """Test a box, at once or together with others; ValueError if it can not be tested at all."""
@@ -126,13 +128,13 @@ class Boxes:
         part, low, high = one
         if known is None or not _proven(known, part, alpha_number(low), alpha_number(high)):
             where = f"[{float(alpha_number(low))}, {float(alpha_number(high))}]"
-            self._fail(f"selection {_text(selection)}: the claim about {where} is not proven")
+            self.fail(f"selection {shown(selection.plain.rows.codes)}: the claim about {where} is not proven")
         if part[0] != "e":
             return
         seen = [int(found.ends[0][part[3]]) for found in bounds] == _expected(part)
         if not seen and not selection.signs_differ(part):
             near = float(alpha_number(low))
-            self._fail(f"selection {_text(selection)}: bounds of an event near {near} are not proven")
+            self.fail(f"selection {shown(selection.plain.rows.codes)}: bounds of an event near {near} are not proven")
 
 
 def _questions(one: Said) -> Iterator[tuple[Any, Any]]:
@@ -183,6 +185,11 @@ def check_entries(part: Any, conditions: int) -> None:
         raise ValueError("an event names no condition")
 
 
+def shown(codes: Codes) -> str:
+    """A selection as text."""
+    return "".join(map(str, codes))
+
+
 def inside(zero: tuple[Fraction, Fraction], part: tuple[Fraction, Fraction]) -> bool:
     """True if the bounds of a zero lie in a part, in their order."""
     return part[0] <= zero[0] < zero[1] <= part[1]
@@ -198,7 +205,3 @@ def alpha_number(value: object) -> Fraction:
 def _plain(value: object) -> float | Fraction:
     """An alpha for an expansion in double arithmetic, as a float if it is one."""
     return value if isinstance(value, float) else alpha_number(value)
-
-
-def _text(selection: BoxSelection) -> str:
-    return "".join(map(str, selection.plain.rows.codes))

@@ -1,8 +1,6 @@
 """Checker of the arcs of a branch graph: where every surviving selection holds, and how arcs are joined.
 
-Records (see docs/proof_format.md, under Arcs): ``{"traces", "force", "length"}``; for every selection and every
-interval on which it survives ``["t", codes, low, high, side]``, then its boxes ``["b", low, high, precise,
-parts]``.
+Records are those of docs/proof_format.md, section 7.3.
 
 Every box is expanded anew by the trusted core, and every part of it is tested (``arc_boxes``). Then events are paired
 by the condition that vanishes: each must have exactly one partner, arcs end at events, at the interval's ends or where
@@ -11,7 +9,7 @@ g vanishes, and indices balance. What a proof leaves open is counted.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from fractions import Fraction
 from functools import cached_property
 from itertools import pairwise
@@ -19,9 +17,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from enumsol.checker.arc_boxes import Boxes, BoxSelection, alpha_number, check_entries, inside
+from enumsol.checker.arc_boxes import Boxes, BoxSelection, alpha_number, check_entries, inside, shown
 from enumsol.proof.leaves import OnlyReference, Unbalanced
-from enumsol.proof.reading import RefusedError, codes_from, names_only, numbers_from, quoted, same, units_from
+from enumsol.proof.reading import RefusedError, names_only, quoted, same, units_from
 from enumsol.support.deadlines import tell
 from enumsol.trusted.arcs.only_branch import branch_references, only_roots
 from enumsol.trusted.arcs.selection_balls import ArcSelection, ArcSystem
@@ -33,17 +31,12 @@ from enumsol.trusted.status_rows import FRICTIONLESS, OPEN, SLIP_MINUS, SLIP_PLU
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Mapping, Sequence
 
+    from enumsol.arithmetic.balls import Ball
     from enumsol.condensation.enclosure import CondensedEnclosure
     from enumsol.model.problem import ContactProblem
     from enumsol.support.array_types import Codes
 
     Span = tuple[Fraction, Fraction, int]
-
-
-#: Entries of the record, of a body that nothing holds with those of its form.
-_ENTRIES, _FLOATING_ENTRIES = 4, 5
-#: Of theta.
-_MOST_DEGREE = 32
 
 
 @dataclass(eq=False)
@@ -90,14 +83,14 @@ class ClaimedArc:
 
 @dataclass(eq=False)
 class PieceOnArcs:
-    """A piece whose solutions are said to lie on the arcs through it.
+    """Leaves over a piece that say that its solutions lie on the arcs through it, by one form.
 
     Attributes
     ----------
     a, b : Fraction
     numbers : PieceNumbers
     leaves : list of (codes, record)
-        Of a body that nothing holds: below which assignments there is nothing else.
+        Below which assignments there is nothing else.
     bounded : bool
         That was shown within the bound of its rigid displacement only.
     """
@@ -108,24 +101,9 @@ class PieceOnArcs:
     leaves: list[tuple[Codes, OnlyReference | Unbalanced]] = field(default_factory=list)
     bounded: bool = False
 
-    @classmethod
-    def read(cls, a: Fraction, b: Fraction, record: list[Any], p: int, *, held: bool) -> PieceOnArcs:
-        """From its record."""
-        expected = _ENTRIES if held else _FLOATING_ENTRIES
-        if len(record) != expected:
-            raise ValueError(f"a record of kind 'm' has {len(record)} entries; expected {expected}")
-        mu, kappa, nu = (numbers_from(values, p) for values in record[1:4])
-        numbers = PieceNumbers(mu, kappa, nu)
-        if not held:
-            balance, share, degree = numbers_from(record[4], 3).tolist()
-            if degree not in range(1, _MOST_DEGREE + 1):
-                raise ValueError(f"the degree of theta is not among 1 to {_MOST_DEGREE}")
-            numbers = replace(numbers, balance=balance, share=share, degree=int(degree))
-        if not numbers.usable:
-            raise ValueError("a number mu or kappa is not positive, or the factor of the balance negative")
-        return cls(a, b, numbers)
-
-    def failure(self, arcs: Sequence[ClaimedArc], systems: dict[int, ArcSystem], origin: Fraction | None) -> str | None:
+    def failure(
+        self, arcs: Sequence[ClaimedArc], systems: dict[int, ArcSystem[Ball]], origin: Fraction | None
+    ) -> str | None:
         """Why the arcs are not shown to hold all its solutions, or None. Events have their partners."""
         side = 0 if origin is None else 1 if self.b > origin else -1
         chain = self._chain([arc for arc in arcs if arc.side == side])
@@ -140,7 +118,7 @@ class PieceOnArcs:
         proven = all(only_roots(spans, self.numbers)) if not len(system.reach) else self._covered(spans, system)
         return None if proven else "its arcs are not proven to hold all its solutions"
 
-    def _covered(self, spans: Sequence[tuple[ArcSelection, float, float]], system: ArcSystem) -> bool:
+    def _covered(self, spans: Sequence[tuple[ArcSelection, float, float]], system: ArcSystem[Ball]) -> bool:
         """True if every leaf is proven to hold nothing beside the arcs (theory, section 14.16)."""
         ends = _below(self.a), -_below(-self.b)
         known, free = branch_references(spans, self.numbers), without_bound(system.at(*ends)).reach
@@ -194,10 +172,11 @@ _PAIRS = (
 )
 
 
+@dataclass
 class ArcChecker:
     """Checks the traces of a graph's proof.
 
-    Parameters
+    Attributes
     ----------
     problem : ContactProblem
     enclosure : CondensedEnclosure
@@ -210,9 +189,6 @@ class ArcChecker:
     closed : sequence of PieceOnArcs
         Pieces whose solutions are said to lie on the arcs through them.
     fail : called with a sentence for every failure
-
-    Attributes
-    ----------
     traces : int
     arcs : list of ClaimedArc
     events : list of ClaimedEvent
@@ -220,40 +196,37 @@ class ArcChecker:
         Intervals that were left open, and events without a partner beside them.
     """
 
-    def __init__(
-        self,
-        problem: ContactProblem,
-        enclosure: CondensedEnclosure,
-        interval: tuple[Fraction, Fraction],
-        origin: Fraction | None,
-        pieces: Mapping[Codes, list[tuple[Fraction, Fraction]]],
-        closed: Sequence[PieceOnArcs],
-        fail: Callable[[str], None],
-    ) -> None:
-        self._problem, self._enclosure, self._interval, self._origin = problem, enclosure, interval, origin
-        self._fail = fail
-        self._due = {(codes, *span) for codes, where in pieces.items() for span in self._spans(where)}
-        self._systems: dict[int, ArcSystem] = {}
-        self._closed = closed
-        self.events: list[ClaimedEvent] = []
-        self.arcs: list[ClaimedArc] = []
-        self._boxes = Boxes(fail)
-        self.traces = self.open = 0
-        # sums of the indices of arcs that begin there
-        self._degrees = {"first": 0}
-        if origin is not None and interval[0] < origin < interval[1]:
+    problem: ContactProblem
+    enclosure: CondensedEnclosure
+    interval: tuple[Fraction, Fraction]
+    origin: Fraction | None
+    pieces: Mapping[Codes, list[tuple[Fraction, Fraction]]]
+    closed: Sequence[PieceOnArcs]
+    fail: Callable[[str], None]
+    traces: int = 0
+    arcs: list[ClaimedArc] = field(default_factory=list)
+    events: list[ClaimedEvent] = field(default_factory=list)
+    open: int = 0
+    _systems: dict[int, ArcSystem[Ball]] = field(default_factory=dict)
+    #: Sums of the indices of arcs that begin there.
+    _degrees: dict[str, int] = field(default_factory=lambda: {"first": 0})
+
+    def __post_init__(self) -> None:
+        self._due = {(codes, *span) for codes, where in self.pieces.items() for span in self._spans(where)}
+        self._boxes = Boxes(self.fail)
+        if self.origin is not None and self.interval[0] < self.origin < self.interval[1]:
             self._degrees["unloaded"] = 0
 
     def run(self, head: dict[str, Any], records: Iterator[Any]) -> Any:
         """Check all traces; gives the record after them."""
         try:
             names_only(head, ("traces", "force", "length"))
-            units = units_from(head, self._problem.p)
+            units = units_from(head, self.problem.p)
         except ValueError as error:
             raise RefusedError(f"the arcs cannot be read: {error}") from None
-        sides = (0,) if self._origin is None else (-1, 1)
-        given = self._problem, self._enclosure
-        self._systems = {side: ArcSystem.of(*given, *units, float(side)) for side in sides}
+        sides = (0,) if self.origin is None else (-1, 1)
+        system = ArcSystem.of(self.problem, self.enclosure, *units)
+        self._systems = {side: system.beside_zero(float(side)) for side in sides}
         record, due = next(records, _END), len(self._due)
         while isinstance(record, list):
             tell("selections followed", min(self.traces, due), due)
@@ -264,33 +237,33 @@ class ArcChecker:
                 raise RefusedError(f"trace {self.traces} cannot be read: {error}") from None
         self._boxes.check()
         if not same(head["traces"], self.traces):
-            self._fail(f"there are {self.traces} traces; the arcs begin with {quoted(head['traces'])}")
+            self.fail(f"there are {self.traces} traces; the arcs begin with {quoted(head['traces'])}")
         if self._due:
-            self._fail(f"{len(self._due)} of the surviving selections are not traced")
+            self.fail(f"{len(self._due)} of the surviving selections are not traced")
         self._pair()
-        for piece in self._closed:
-            failure = piece.failure(self.arcs, self._systems, self._origin)
+        for piece in self.closed:
+            failure = piece.failure(self.arcs, self._systems, self.origin)
             if failure is not None:
-                self._fail(f"the piece from {float(piece.a)} to {float(piece.b)}: {failure}")
+                self.fail(f"the piece from {float(piece.a)} to {float(piece.b)}: {failure}")
         for place, total in self._degrees.items():
-            if self._problem.held and not self.open and total != 1:
-                self._fail(f"the indices at the {place} alpha add up to {total}; expected 1")
+            if self.problem.held and not self.open and total != 1:
+                self.fail(f"the indices at the {place} alpha add up to {total}; expected 1")
         return record
 
     def _spans(self, pieces: list[tuple[Fraction, Fraction]]) -> Iterator[Span]:
         """Pieces joined where they touch, cut where g vanishes, with the side of that alpha."""
         merged: list[list[Fraction]] = []
         for a, b in sorted(pieces):
-            if merged and a <= merged[-1][1] and a != self._origin:
+            if merged and a <= merged[-1][1] and a != self.origin:
                 merged[-1][1] = max(b, merged[-1][1])
             else:
                 merged.append([a, b])
         for a, b in merged:
             cuts = [a, b]
-            if self._origin is not None and a < self._origin < b:
-                cuts.insert(1, self._origin)
+            if self.origin is not None and a < self.origin < b:
+                cuts.insert(1, self.origin)
             for x, y in pairwise(cuts):
-                yield x, y, 0 if self._origin is None else 1 if y > self._origin else -1
+                yield x, y, 0 if self.origin is None else 1 if y > self.origin else -1
 
     # -- one trace -------------------------------------------------------------------------------------------------
 
@@ -298,25 +271,25 @@ class ArcChecker:
         """Check a trace and follow its arcs; gives the record after it."""
         if len(record) != 5 or record[0] != "t" or type(record[4]) is not int or record[4] not in (-1, 0, 1):
             raise ValueError(f"{quoted(record)} begins no trace")
-        codes = tuple(codes_from([record[1]], self._problem.p)[0].tolist())
         low, high, side = alpha_number(record[2]), alpha_number(record[3]), record[4]
-        spans = (d for d in self._due if d[0] == codes and d[3] == side)
+        spans = (d for d in self._due if same(record[1], [*d[0]]) and d[3] == side)
         due = next((d for d in spans if _is_next(-low, -d[1]) and _is_next(high, d[2])), None)
         if due is None:
             raise ValueError("its selection does not survive there, or the trace is repeated")
         self._due.remove(due)
+        codes = due[0]
         selection = BoxSelection(self, ArcSelection(self._systems[side], codes), side)
         follower = _Follower(self, selection.conditions, codes, side, (low, high))
         end, boxes = low, 0
         record = next(records, _END)
-        while isinstance(record, list) and record and record[0] == "b":
+        while isinstance(record, list) and record and record[0] == "w":
             boxes += 1
             if boxes > _MOST_BOXES:
                 raise ValueError(f"it has more than {_MOST_BOXES} boxes")
             end = self._box(record, selection, follower, end)
             record = next(records, _END)
         if end != high:
-            self._fail(f"the boxes of selection {_text(codes)} do not cover its trace")
+            self.fail(f"the boxes of selection {shown(codes)} do not cover its trace")
         follower.finish()
         return record
 
@@ -346,9 +319,9 @@ class ArcChecker:
 
     def end_at(self, alpha: Fraction, side: int, *, upper: bool) -> bool:
         """True if an arc may end there: at an end of the interval, or where g vanishes."""
-        if self._origin is not None and side == (-1 if upper else 1):
-            return alpha >= self._origin if upper else alpha <= self._origin
-        return alpha >= self._interval[1] if upper else alpha <= self._interval[0]
+        if self.origin is not None and side == (-1 if upper else 1):
+            return alpha >= self.origin if upper else alpha <= self.origin
+        return alpha >= self.interval[1] if upper else alpha <= self.interval[0]
 
     def arc(self, arc: ClaimedArc, index: int, starts: int | None) -> None:
         """Keep an arc; one that begins at an end of the interval, or where g vanishes, with its side."""
@@ -359,19 +332,21 @@ class ArcChecker:
     @cached_property
     def precise_system(self) -> Any:
         """The problem in many digits."""
-        from enumsol.trusted.arcs.many_digits import affordable
-        from enumsol.trusted.arcs.precise import PreciseSystem  # python-flint, not for all proofs
+        from enumsol.trusted.arcs.precise import (
+            affordable,
+            system_in_many_digits,  # python-flint, not for all proofs
+        )
 
-        if not affordable(self._problem):
+        if not affordable(self.problem):
             raise ValueError("a box in many digits belongs to a problem that is too large for it")
-        system = PreciseSystem.of(self._problem)
+        system = system_in_many_digits(self.problem)
         if system is None:
             raise ValueError("A is positive definite only within rounding")
         return system
 
-    def fail(self, codes: Codes, alpha: Fraction) -> None:
-        """An arc that begins or ends where it must not."""
-        self._fail(f"an arc of selection {_text(codes)} begins or ends at {float(alpha)} for no reason")
+    def loose_end(self, codes: Codes, alpha: Fraction) -> None:
+        """Fail since an arc begins or ends where it must not."""
+        self.fail(f"an arc of selection {shown(codes)} begins or ends at {float(alpha)} for no reason")
 
     def _pair(self) -> None:
         """Pair events; each belongs to exactly one other, unless something beside it was left open."""
@@ -395,41 +370,39 @@ class ArcChecker:
                 # going on the index stays, turning back it changes its sign
                 same = event.rising != partner.rising
                 if event.index != (partner.index if same else -partner.index):
-                    self._fail(f"indices do not balance at {float(event.zero[0])}")
+                    self.fail(f"indices do not balance at {float(event.zero[0])}")
             elif event.bound:
                 continue  # beyond, nothing is asked
             elif event.partners:
-                where = f"selection {_text(event.codes)} at {float(event.zero[0])}"
-                self._fail(f"an event of {where} has {len(event.partners)} partners")
+                where = f"selection {shown(event.codes)} at {float(event.zero[0])}"
+                self.fail(f"an event of {where} has {len(event.partners)} partners")
             else:
                 self.open += 1  # bounds too wide to find the partner, or it was left open
 
 
+@dataclass
 class _Follower:
     """The arcs of one trace, from left to right."""
 
-    def __init__(
-        self,
-        checker: ArcChecker,
-        conditions: tuple[tuple[int, int], ...],
-        codes: Codes,
-        side: int,
-        ends: tuple[Fraction, Fraction],
-    ) -> None:
-        self.codes, self._conditions = codes, conditions
-        self._checker, self._side, self._ends = checker, side, ends
-        self._index, self._first, self._open = 0, True, False
-        self._arc: ClaimedArc | None = None
+    checker: ArcChecker
+    conditions: tuple[tuple[int, int], ...]
+    codes: Codes
+    side: int
+    ends: tuple[Fraction, Fraction]
+    _index: int = 0
+    _first: bool = True
+    _open: bool = False
+    _arc: ClaimedArc | None = None
 
     def part(self, kind: str, part: list[Any], ends: tuple[Fraction, Fraction]) -> None:
         """Go on through a part."""
         if kind == "u":
             if not self._open:  # parts that touch are one interval
-                self._checker.open += 1
+                self.checker.open += 1
             self._arc = None
         elif kind == "n":
             if self._arc is not None:
-                self._checker.fail(self.codes, ends[0])
+                self.checker.loose_end(self.codes, ends[0])
             self._arc = None
         else:
             self._present(kind, part, ends)
@@ -440,23 +413,23 @@ class _Follower:
         event = None
         if kind == "e":
             zero = (alpha_number(part[5]), alpha_number(part[6]))
-            condition = self._conditions[part[3]]
-            event = ClaimedEvent(self.codes, self._side, condition, ends, zero, part[4] == 1, part[2], [])
-            self._checker.events.append(event)
+            condition = self.conditions[part[3]]
+            event = ClaimedEvent(self.codes, self.side, condition, ends, zero, part[4] == 1, part[2], [])
+            self.checker.events.append(event)
         rising = event is not None and event.rising
         if rising and self._arc is not None:
-            self._checker.fail(self.codes, ends[0])
+            self.checker.loose_end(self.codes, ends[0])
         if not rising and self._arc is None:
-            starts = self._first and self._checker.end_at(self._ends[0], self._side, upper=False)
+            starts = self._first and self.checker.end_at(self.ends[0], self.side, upper=False)
             if not starts and not self._open:
-                self._checker.fail(self.codes, ends[0])
-            self._arc = ClaimedArc(self.codes, self._side, ends[0], ends[0])
-            self._checker.arc(self._arc, part[2], self._side if starts else None)
+                self.checker.loose_end(self.codes, ends[0])
+            self._arc = ClaimedArc(self.codes, self.side, ends[0], ends[0])
+            self.checker.arc(self._arc, part[2], self.side if starts else None)
         elif event is not None and rising:
-            self._arc = ClaimedArc(self.codes, self._side, event.zero[1], event.zero[1], event)
-            self._checker.arc(self._arc, part[2], None)
+            self._arc = ClaimedArc(self.codes, self.side, event.zero[1], event.zero[1], event)
+            self.checker.arc(self._arc, part[2], None)
         elif part[2] != self._index:
-            self._checker.fail(self.codes, ends[0])
+            self.checker.loose_end(self.codes, ends[0])
         self._index = part[2]
         assert self._arc is not None
         self._arc.high = ends[1]
@@ -466,14 +439,10 @@ class _Follower:
 
     def finish(self) -> None:
         """The end of the trace."""
-        if self._arc is not None and not self._checker.end_at(self._ends[1], self._side, upper=True):
-            self._checker.fail(self.codes, self._ends[1])
+        if self._arc is not None and not self.checker.end_at(self.ends[1], self.side, upper=True):
+            self.checker.loose_end(self.codes, self.ends[1])
 
 
 def _is_next(value: Fraction, end: Fraction) -> bool:
     """True if it is the smallest float that is not smaller than ``end``: what is beyond would not be about it."""
     return value == end or (value > end and Fraction(np.nextafter(float(value), -np.inf)) < end)
-
-
-def _text(codes: Codes) -> str:
-    return "".join(map(str, codes))

@@ -50,17 +50,6 @@ class _Stage:
     ends: list[list[Ball]] = field(default_factory=list)
 
 
-@dataclass(frozen=True)
-class SearchRecords:
-    """The records of one search, as a checker of root sets reads them."""
-
-    lines: list[Any]
-
-    def records(self) -> Iterator[Any]:
-        """The records one by one."""
-        return iter(self.lines)
-
-
 class HistoryChecker(ProofChecker):
     """Checks the proof of a history.
 
@@ -145,7 +134,7 @@ class HistoryChecker(ProofChecker):
         checker.enclosure, checker.located = enclosure_of(problem), {}
         tell("searches", number, count)
         with heard_by(tell_part(f"of search {number + 1}")):
-            report = checker.run(SearchRecords(search_records(records)))
+            report = checker.run(search_records(records))
         where = f"search {number} (step {stage.step})"
         self.failures += [f"{where}: {failure}" for failure in report.failures]
         if len(self.failures) >= MAX_FAILURES:
@@ -233,11 +222,11 @@ class HistoryChecker(ProofChecker):
         )
 
 
-def search_records(records: Iterator[Any]) -> list[Any]:
-    """The records of the next search: up to the object that ends it."""
+def search_records(records: Iterator[Any]) -> Callable[[], Iterator[Any]]:
+    """Reader of the records of the next search: up to the object that ends it."""
     lines: list[Any] = []
     for record in records:
         lines.append(record)
         if isinstance(record, dict) and len(lines) > 1:
-            return lines
+            return lambda: iter(lines)
     raise RefusedError("the proof breaks off within a search")

@@ -22,7 +22,6 @@ from enumsol.proof.proof_file import fraction_text
 from enumsol.proof.reading import RefusedError, data_of, friction_at, rational_from, same, units_from
 from enumsol.proof.records import DeclaredForm, Limits, Tree
 from enumsol.trusted.at_alpha import JointRoot, VerifiedSelection, settled_selection, told_apart
-from enumsol.trusted.exclusion import Leaves, Terms, exclusion_margins
 from enumsol.trusted.floating_bounds import without_bound
 from enumsol.trusted.positions import certain_statuses
 from enumsol.trusted.status_rows import (
@@ -33,13 +32,12 @@ from enumsol.trusted.status_rows import (
 from enumsol.trusted.uniqueness import ClosedSolution, same_solution
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Callable, Sequence
 
     from enumsol.checker.rational import Hull, RationalBody, RationalSystem
     from enumsol.checker.walk import Test
     from enumsol.proof.records import EnclosureRecord, Record
-    from enumsol.support.array_types import Codes, Mask
-    from enumsol.trusted.arcs.precise import PreciseAtAlpha
+    from enumsol.support.array_types import Codes
     from enumsol.trusted.at_alpha import Unsettled
     from enumsol.trusted.positions import Among
 
@@ -47,9 +45,6 @@ if TYPE_CHECKING:
     Polytope = tuple[tuple[int, ...], list[Any], int]
     #: The core of a solution, and per node the codes that may hold there.
     Known = tuple[Codes, Sequence[frozenset[int]]]
-
-#: Exclusion leaves checked together.
-_BATCH = 256
 
 
 @dataclass
@@ -60,8 +55,6 @@ class Checker(TreeChecker[EnclosedSystem, "VerifiedSelection | ClosedSolution | 
 
     polytopes: list[Polytope] = field(default_factory=list)
     closed: dict[tuple[int, ...], ClosedSolution | JointRoot] = field(default_factory=dict)
-    #: Leaves to be tested together, by the places of their forms: numbers, codes and multipliers.
-    _waiting: dict[int | None, list[tuple[int, Codes, Terms]]] = field(default_factory=dict)
     #: Roots that selections share, by the one in which all their nodes stick, and by how these slip.
     shared: dict[tuple[Codes, tuple[tuple[int, int], ...]], JointRoot | None] = field(default_factory=dict)
 
@@ -129,31 +122,6 @@ class Checker(TreeChecker[EnclosedSystem, "VerifiedSelection | ClosedSolution | 
         except (NotEnclosedError, RefusedError):
             return False
 
-    def _flush(self, *, last: bool) -> None:
-        """Check the dual inequalities of the waiting leaves together, form by form."""
-        if not last and sum(map(len, self._waiting.values())) < _BATCH:
-            return
-        waiting, self._waiting = self._waiting, {}
-        for place, leaves in waiting.items():
-            numbers, codes, terms = zip(*leaves, strict=True)
-            given = Leaves.of(codes, terms)
-            if place is None:
-                proven = self._excludes(given)
-            else:
-                with np.errstate(over="ignore", invalid="ignore"):
-                    proven = exclusion_margins(self._form(len(self.declared) - place), given) > 0
-            for number in np.array(numbers)[~proven]:
-                form = "" if place is None else "form and "
-                self.fail(f"leaf {number}: its {form}multipliers do not exclude it")
-
-    def _excludes(self, leaves: Leaves) -> Mask:
-        """Mask of assignments without a solution, if possible without the bound of the rigid displacement."""
-        proven = exclusion_margins(self.free, leaves) > 0
-        if not self.problem.held and not np.all(proven):
-            self.bounded = True
-            proven |= exclusion_margins(self.system, leaves) > 0
-        return np.asarray(proven)
-
     def _limits(self, codes: Codes, kind: type[Record]) -> Limits:
         friction = self.friction
         if kind is kinds.Closed or (kind is DeclaredForm and not self.problem.held):
@@ -172,7 +140,6 @@ class Checker(TreeChecker[EnclosedSystem, "VerifiedSelection | ClosedSolution | 
     def tests(self) -> dict[type[Record], Test]:
         """Tests of leaves, by their kinds."""
         return super().tests | {
-            kinds.Excluded: self._excluded,
             kinds.RootSetRecord: self._root_set,
             kinds.Closed: self._closed,
             kinds.SharedRoot: self._shared,
@@ -182,29 +149,25 @@ class Checker(TreeChecker[EnclosedSystem, "VerifiedSelection | ClosedSolution | 
         self.polytopes.append(((0,) * self.problem.p, [tuple([Fraction(0)] * (2 * self.problem.p))], 0))
 
     def _excluded(self, codes: Codes, said: kinds.Excluded) -> str | None:
-        if said.by == kinds.RATIONAL:
-            return self._excluded_in_rationals(codes, said)
-        place = len(self.declared) - said.by if isinstance(said.by, int) else None
-        self._waiting.setdefault(place, []).append((self.leaves, codes, said.terms))
-        return None
+        return self._excluded_in_rationals(codes, said) if said.by == kinds.RATIONAL else super()._excluded(codes, said)
 
     def _settled(self, system: EnclosedSystem, codes: Codes) -> VerifiedSelection | Unsettled | None:
         return settled_selection(system, codes, self._in_many_digits)
 
     def _in_many_digits(self, codes: Codes) -> VerifiedSelection | None:
-        return None if self._precise is None else self._precise.solve(codes)
+        return None if self._precise is None else self._precise(codes)
 
     def _is_root(self, found: object) -> bool:
         return isinstance(found, VerifiedSelection)
 
     @cached_property
-    def _precise(self) -> PreciseAtAlpha | None:
-        """The problem in many digits; None where that is not to be had, or the proof is about S and g as computed."""
+    def _precise(self) -> Callable[[Codes], VerifiedSelection | None] | None:
+        """Solutions in many digits; None where these are not to be had, or the proof is about S and g as computed."""
         if self.data == "condensed" or not self.problem.held:
             return None
-        from enumsol.trusted.arcs.precise import PreciseAtAlpha  # python-flint, not always needed
+        from enumsol.trusted.arcs.precise import verified_in_many_digits  # python-flint, not always needed
 
-        return PreciseAtAlpha.of(self.problem, self.alpha, self.force, self.length)
+        return verified_in_many_digits(self.problem, self.alpha, self.force, self.length)
 
     def _no_root(self, codes: Codes, said: kinds.NoRoot) -> str | None:
         if said.by != kinds.RATIONAL:

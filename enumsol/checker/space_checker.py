@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from enumsol.arithmetic.balls import TINY, Ball
+from enumsol.arithmetic.balls import Ball
 from enumsol.checker.walk import NO_FORM, Located, TreeChecker
 from enumsol.condensation.data import exactly_at
 from enumsol.condensation.space_condensed import EnclosedSpace
@@ -77,7 +77,7 @@ class SpaceChecker(TreeChecker[EnclosedSpace, "SpaceRoot | LooseSolution"]):
     @cached_property
     def tests(self) -> dict[type[Record], Test]:
         """Tests of leaves, by their kinds."""
-        return super().tests | {Excluded: self._excluded, BoxedRoot: self._in_box}
+        return super().tests | {BoxedRoot: self._in_box}
 
     def _settled(self, system: EnclosedSpace, codes: Codes) -> SpaceRoot | Open | None:
         return settle(system, codes)
@@ -164,15 +164,10 @@ class SpaceChecker(TreeChecker[EnclosedSpace, "SpaceRoot | LooseSolution"]):
         """
         if self.located is None:
             return
-        p, system, y = self.problem.p, self.system, found.y
-        forces, unit = Ball(np.zeros(3 * p), np.zeros(3 * p)), np.tile(self.force, 3)
-        pressed = np.array([code != OPEN for code in codes or (STICK,) * p])
-        forces[:p] = Ball(np.where(pressed, y.mid[:p], 0.0), np.where(pressed, y.rad[:p], 0.0))
-        for k in (0, 1):
-            nodes = np.flatnonzero((system.tau[:, k] >= 0) & pressed)
-            forces[(1 + k) * p + nodes] = y[system.tau[nodes, k]] * Ball(system.F[nodes, k], system.F_rad[nodes, k])
-        zero = (forces.mid == 0) & (forces.rad == 0)
-        forces = Ball(forces.mid * unit, np.where(zero, 0.0, forces.rad * unit + TINY))
+        p, system = self.problem.p, self.system
+        forces = system.forces_of(found.y, self.force)
+        idle = np.tile([code == OPEN for code in codes or (STICK,) * p], 3)
+        forces.mid[idle] = forces.rad[idle] = 0.0
         certain: Codes | None = tuple(codes)
         if isinstance(found, LooseSolution):
             certain, still = found.certain(np.any(system.tau >= 0, axis=1)), ~(found.slip | found.open)

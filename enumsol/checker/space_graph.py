@@ -1,41 +1,29 @@
 """Checker of a branch graph in 3D: every solution over an interval lies on curves, each given by boxes.
 
-Records: a header ``{"format": "enumsol-proof", "version": 2, "kind": "graph", "problem": <fingerprint>, "interval":
-[a, b], "p": p, "data": "problem", "force", "length", "steps"}`` with the steps of the coordinates (see AlphaProblem);
-for every curve ``{"curve": n}`` with n boxes, and these as ``["w", centre, direction, border, radius, rho, half]``
-between n + 1 boxes without length around the points that they share (see ``trusted.space.curve_runs``), and perhaps
-how it is cut into arcs (see below);
-``{"tree": true}`` and the records of a tree of ``PieceTreeChecker``, whose boxes are numbered in the order of the
-curves, points left out; at the end ``{"curves", "arcs", "leaves", "gaps"}``, arcs null where not all curves are cut. Of
-a body that nothing holds the header has ``max_rigid_displacement``, too, and boxes have its rigid displacement.
+Records are those of docs/proof_format.md, section 8.
 
 What is checked: every curve is one, from end to end; no two have a point in common; the leaves of the tree cover all
 solutions, and those of a leaf lie on one of the curves. An end inside the interval is a gap, as an open leaf is.
-
-How a curve is cut into arcs (theory, section 12.10). Records of a curve: ``{"parts": true}``, then parts in the order
-of a walk, those of every box between its two points: ``["s", box]`` (statuses stay and alpha goes one way), ``["f",
-box, before, after]`` (statuses stay and alpha turns back once, between two places), ``["c", box, before, after, near]``
-(nodes change their statuses between two places, each of them once; the parts before and behind follow), ``["h", box,
-middle]`` (both halves follow) and ``["u", box]`` (open). Boxes and places are given as those of a curve are; the first
-one may be null where a box is known, the last one of "c" where the part's own box serves.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 from typing import TYPE_CHECKING, Any, cast
 
 import numpy as np
 
 from enumsol.checker.graph_checker import END, GraphChecker, interval_from
 from enumsol.checker.reports import GraphVerificationReport
+from enumsol.checker.walk import TreeCell
 from enumsol.condensation.data import exactly_at
 from enumsol.condensation.enclosure import CondensedEnclosure
 from enumsol.condensation.space_condensed import AlphaSpace
-from enumsol.proof.curve_records import CurvePart, CutPiece, OnCurve, ThroughCurveBox, box_from
-from enumsol.proof.leaves import Excluded, NoRoot, Unbalanced, UndecidedRecord, kind_of
+from enumsol.proof.curve_records import CurvePart, OnCurve, ThroughCurveBox, box_from
+from enumsol.proof.leaves import Excluded, NoRoot, Unbalanced, UndecidedRecord
 from enumsol.proof.reading import RecordError, RefusedError, data_of, numbers_from, quoted, same, units_from
-from enumsol.proof.records import Branching, Limits, Tree
+from enumsol.proof.records import Limits, Tree
 from enumsol.trusted.space.curve_parts import CurveMotion, LinkParts, arcs_over, in_order, up_to_bound
 from enumsol.trusted.space.curve_runs import KnownCurve, apart, chain_of
 from enumsol.trusted.space.pieces import AlphaPiece
@@ -44,11 +32,12 @@ from enumsol.trusted.space.solution_curve import AlphaProblem, only_curve
 from enumsol.trusted.space.space_uniqueness import is_complete
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator, Sequence
+    from collections.abc import Iterator, Sequence
     from fractions import Fraction
 
     from numpy.typing import NDArray
 
+    from enumsol.checker.walk import Test
     from enumsol.model.problem3d import ContactProblem3D
     from enumsol.proof.curve_records import CurveBoxRecord
     from enumsol.proof.records import Record
@@ -60,125 +49,39 @@ if TYPE_CHECKING:
     Codes = tuple[int, ...]
 
 
+#: More boxes of one curve than this are no honest proof's.
+_MOST_BOXES = 1 << 20
+_NOT_FINAL = "its statuses are not final"
+
+
 @dataclass
-class PieceTreeChecker:
-    """Checks one tree over an interval.
+class SpaceGraphChecker(GraphChecker):
+    """Checks the records of a graph's proof in 3D: curves, then a tree over the interval.
 
     Attributes
     ----------
-    enclosure : CondensedEnclosure
-    units : force and length, (p,) arrays of powers of two
-    curves : sequence of KnownCurve
-        Each is proven to be one. Their boxes are numbered in this order.
-    fail : called with what a leaf does not prove
-    leaves : int
+    curves : list of CurveChain
+        Each is proven to be one.
+    arcs : int or None
     gaps : list of (low, high)
-        Pieces of open leaves.
     """
 
-    enclosure: CondensedEnclosure
-    units: tuple[Array, Array]
-    curves: Sequence[KnownCurve]
-    fail: Callable[[str], object]
-    leaves: int = 0
+    trees = Tree.PIECE, Tree.FLOATING_PIECE
+    of_tree = " of the tree over alpha"
+
+    curves: list[CurveChain] = field(default_factory=list)
+    arcs: int | None = 0
     gaps: list[tuple[Fraction, Fraction]] = field(default_factory=list)
-
-    def run(self, low: Fraction, high: Fraction, records: Iterator[Any]) -> None:
-        """Check the records of the tree over [low, high]; none is read after its last one.
-
-        Raises
-        ------
-        RefusedError
-            They are no tree.
-        """
-        problem, self._interval = self.enclosure.problem, (low, high)
-        pairs = list(zip(problem.friction, problem.friction_slope, strict=True))
-        ends = [[exactly_at(end, *pair) for end in (low, high)] for pair in pairs]
-        occurs = [[max(values) > 0 for values in zip(*both, strict=True)] for both in ends]
-        self._tangents = [one + other for one, other in zip(*occurs, strict=True)]
-        #: The curve of every box, and which one of its links it is.
-        self._boxes = [(known, k) for known in self.curves for k in range(len(known.chain.links))]
-        waiting: list[tuple[Fraction, Fraction, Codes]] = [(low, high, (UNDECIDED,) * problem.p)]
-        space = AlphaSpace(self.enclosure, (low + high) / 2, self.units)
-        piece = AlphaPiece(space, low, high)
-        while waiting:
-            low, high, codes = waiting.pop()
-            if (low, high) != (piece.low, piece.high):
-                piece = AlphaPiece(space, low, high)
-            record = next(records, None)
-            if not isinstance(record, list):
-                raise RefusedError("the tree over alpha ends before all of it is decided")
-            try:
-                waiting += self._below(piece, codes, record)[::-1]
-            except ValueError as error:
-                raise RefusedError(f"leaf {self.leaves + 1} of the tree over alpha: {error}") from None
-
-    def _below(self, piece: AlphaPiece, codes: Codes, record: list[Any]) -> list[tuple[Fraction, Fraction, Codes]]:
-        """Cells that a record leaves to those after it; none if it is a leaf, which is checked."""
-        kind = record[0] if record else None
-        if kind == CutPiece.kind:
-            alpha = CutPiece.read(record, Limits(codes)).between(piece.low, piece.high)
-            return [(piece.low, alpha, codes), (alpha, piece.high, codes)]
-        if kind == Branching.kind:
-            split = Branching.covering(record, codes, self._covers)
-            return [(piece.low, piece.high, below) for below in split.below(codes)]
-        tree = Tree.PIECE if self.enclosure.problem.held else Tree.FLOATING_PIECE
-        known = kind_of(record, tree)
-        if known is None:
-            raise RecordError(f"unknown kind of record {quoted(kind)}")
-        components, modes = len(codes) + sum(self._tangents), self.enclosure.problem.modes.r
-        leaf = known.read(record, Limits(codes, tree, components=components, modes=modes, boxes=len(self._boxes)))
-        self.leaves += 1
-        if isinstance(leaf, UndecidedRecord):
-            self.gaps.append((piece.low, piece.high))
-        elif (why := self._wrong(piece, codes, leaf)) is not None:
-            self.fail(f"leaf {self.leaves} of the tree over alpha: {why}")
-        return []
-
-    def _covers(self, node: int, code: int, children: list[int]) -> bool:
-        return is_sector_covering(code, children, self._tangents[node])
-
-    def _wrong(self, piece: AlphaPiece, codes: Codes, leaf: Record) -> str | None:
-        """Sentence on what a leaf does not prove; None if all is proven."""
-        if isinstance(leaf, Excluded):
-            return None if leaf.holds(piece, codes) else "its multipliers do not exclude it"
-        if isinstance(leaf, Unbalanced):
-            return None if leaf.holds(piece, codes) else "forces may be in balance"
-        by_form = isinstance(leaf, OnCurve) and leaf.numbers is not None
-        if not by_form and not is_complete(piece.whole, codes):
-            return "its statuses are not final"
-        if isinstance(leaf, NoRoot):
-            return None if piece.narrowed(codes)[1] is None else "it is not proven to hold no root"
-        if isinstance(leaf, OnCurve):
-            where = "it is not proven that all its solutions lie on its curve"
-            where = where if by_form else "its roots are not proven to lie in its boxes"
-            return None if leaf.holds(piece, codes, self._boxes) else where
-        if isinstance(leaf, ThroughCurveBox):
-            met = leaf.holds(piece, codes, self._boxes, self._interval)
-            return None if met else "its roots are not proven to be an arc through its box"
-        raise AssertionError(leaf)
-
-
-#: More boxes of one curve than this are no honest proof's.
-_MOST_BOXES = 1 << 20
-
-
-class SpaceGraphChecker(GraphChecker):
-    """Checks the records of a graph's proof in 3D: see GraphChecker."""
-
-    problem: ContactProblem3D  # type: ignore[assignment]
-
-    def __init__(self, problem: ContactProblem3D, *given: Any) -> None:
-        super().__init__(cast("Any", problem), *given)
-        self.curves: list[CurveChain] = []
-        self.arcs: int | None = 0
-        self.gaps: list[tuple[Fraction, Fraction]] = []
+    #: The curve of every box, and which one of its links it is; the piece of the cell that is looked at.
+    _boxes: list[tuple[KnownCurve, int]] = field(default_factory=list)
+    _over: AlphaPiece = field(init=False)
 
     def _report(self) -> GraphVerificationReport:
         return GraphVerificationReport(pieces=1, arcs=self.arcs, open=len(self.gaps), curves=len(self.curves))
 
     def _check(self, records: Iterator[Any]) -> None:
         units, steps = self._read_units()
+        assert self.interval is not None
         # of a body that nothing holds that of the body on springs
         enclosure = replace(CondensedEnclosure.from_problem(self.problem.on_springs), problem=self.problem)
         given = AlphaProblem.of(enclosure, steps)
@@ -189,16 +92,84 @@ class SpaceGraphChecker(GraphChecker):
         self._compare()
         if record != {"tree": True}:
             raise RefusedError("the tree over alpha is missing")
-        assert self.interval is not None
+        low, high = self.interval
         curves = [KnownCurve(given, chain) for chain in self.curves]
-        tree = PieceTreeChecker(enclosure, units, curves, self.fail)
-        tree.run(*self.interval, records)
-        self.leaves = tree.leaves
-        self.gaps += [gap for chain in self.curves for gap in chain.gaps] + tree.gaps
+        self._boxes = [(known, k) for known in curves for k in range(len(known.chain.links))]
+        self._over = AlphaPiece(AlphaSpace(enclosure, (low + high) / 2, units), low, high)
+        self._walk(records, [TreeCell((UNDECIDED,) * self.problem.p, self.interval)])
+        self.gaps += [gap for chain in self.curves for gap in chain.gaps]
         if self.progress is not None:
             self.progress(self.leaves)
         claim = {"curves": len(self.curves), "arcs": self.arcs, "leaves": self.leaves, "gaps": len(self.gaps)}
         self._check_end(next(records, END), claim, "records", records)
+
+    @cached_property
+    def _tangents(self) -> list[int]:
+        """Number of tangents with friction anywhere in the interval, node by node."""
+        pairs = zip(self.problem.friction, self.problem.friction_slope, strict=True)
+        ends = [[exactly_at(end, *pair) for end in self.interval or ()] for pair in pairs]
+        occurs = [[max(values) > 0 for values in zip(*both, strict=True)] for both in ends]
+        return [one + other for one, other in zip(*occurs, strict=True)]
+
+    def _covers(self, node: int, code: int, children: list[int]) -> bool:
+        return is_sector_covering(code, children, self._tangents[node])
+
+    def _limits(self, codes: Codes, kind: type[Record] | None = None) -> Limits:
+        components, boxes = len(codes) + sum(self._tangents), len(self._boxes)
+        return Limits(codes, self.tree, components=components, modes=self.problem.modes.r, boxes=boxes)
+
+    # -- the tree --------------------------------------------------------------------------------------------------
+
+    def _declare(self, record: list[Any]) -> None:
+        raise RefusedError(f"unknown kind of record {quoted(record[0])}")
+
+    def _leaf(self, cell: TreeCell, record: list[Any]) -> str | None:
+        if cell.piece is not None and cell.piece != (self._over.low, self._over.high):
+            self._over = self._over.over(*cell.piece)
+        return super()._leaf(cell, record)
+
+    @cached_property
+    def tests(self) -> dict[type[Record], Test]:
+        """Tests of leaves, by their kinds."""
+        return {
+            Excluded: self._excluded,
+            Unbalanced: self._unbalanced,
+            NoRoot: self._no_root,
+            OnCurve: self._on_curve,
+            ThroughCurveBox: self._through_box,
+            UndecidedRecord: self._undecided,
+        }
+
+    def _undecided(self, codes: Codes, said: UndecidedRecord) -> str | None:
+        self.gaps.append((self._over.low, self._over.high))
+        return None if isinstance(said.reason, str) else "its reason is not a text"
+
+    def _excluded(self, codes: Codes, said: Excluded) -> str | None:
+        return None if said.holds(self._over, codes) else "its multipliers do not exclude it"
+
+    def _unbalanced(self, codes: Codes, said: Unbalanced) -> str | None:
+        return None if said.holds(self._over, codes) else "forces may be in balance"
+
+    def _no_root(self, codes: Codes, said: NoRoot) -> str | None:
+        if not is_complete(self._over.whole, codes):
+            return _NOT_FINAL
+        return None if self._over.narrowed(codes)[1] is None else "it is not proven to hold no root"
+
+    def _on_curve(self, codes: Codes, said: OnCurve) -> str | None:
+        by_form = said.numbers is not None
+        if not by_form and not is_complete(self._over.whole, codes):
+            return _NOT_FINAL
+        where = "it is not proven that all its solutions lie on its curve"
+        where = where if by_form else "its roots are not proven to lie in its boxes"
+        return None if said.holds(self._over, codes, self._boxes) else where
+
+    def _through_box(self, codes: Codes, said: ThroughCurveBox) -> str | None:
+        if not is_complete(self._over.whole, codes):
+            return _NOT_FINAL
+        met = self.interval is not None and said.holds(self._over, codes, self._boxes, self.interval)
+        return None if met else "its roots are not proven to be an arc through its box"
+
+    # -- header and curves -----------------------------------------------------------------------------------------
 
     def _read_units(self) -> tuple[tuple[Array, Array], Array]:
         """Read the header."""
@@ -210,16 +181,11 @@ class SpaceGraphChecker(GraphChecker):
         except ValueError as error:
             raise RefusedError(f"the header cannot be read: {error}") from None
 
-    @property
-    def _limits(self) -> Limits:
-        """Limits of records about boxes around curves."""
-        return Limits((UNDECIDED,) * self.problem.p, modes=self.problem.modes.r)
-
     def _curve(self, given: AlphaProblem, count: object, records: Iterator[Any]) -> None:
         number = len(self.curves) + 1
         if type(count) is not int or not 0 < count <= _MOST_BOXES:
             raise RefusedError(f"curve {number} has {quoted(count)} boxes")
-        limits, found = self._limits, []
+        limits, found = self._limits((UNDECIDED,) * self.problem.p), []
         for _ in range(2 * count + 1):
             try:
                 said = box_from(next(records, None), limits)
@@ -239,7 +205,7 @@ class SpaceGraphChecker(GraphChecker):
             return record
         assert self.interval is not None
         chain = self.curves[-1]
-        parts = parts_of(given, chain, records, self._limits)
+        parts = parts_of(given, chain, records, self._limits((UNDECIDED,) * self.problem.p))
         arcs, gaps = arcs_over(parts, self.interval, closed=chain.closed)
         self.arcs = None if self.arcs is None else self.arcs + arcs
         self.gaps += gaps

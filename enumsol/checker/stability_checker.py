@@ -13,12 +13,12 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from enumsol.checker.history_checker import SearchRecords, search_records
+from enumsol.checker.history_checker import search_records
 from enumsol.checker.reports import StabilityVerificationReport
 from enumsol.checker.walk import ProofChecker
 from enumsol.condensation.enclosure import enclosure_of
 from enumsol.errors import InvalidArgumentError, InvalidProblemError
-from enumsol.model.mass import checked_mass, mass_fingerprint
+from enumsol.model.mesh import checked_mass, mass_fingerprint
 from enumsol.proof.reading import RefusedError, check_header, quoted, same
 from enumsol.proof.stability_records import (
     DOES_NOT,
@@ -131,7 +131,7 @@ class StabilityChecker(ProofChecker):
         """The roots, by the proof that they are all."""
         checker = self.checker
         checker.enclosure, checker.located = enclosure_of(self.problem), {}
-        self.report = report = checker.run(SearchRecords(search_records(records)))
+        self.report = report = checker.run(search_records(records))
         if report.failures:
             self.failures += [f"roots: {failure}" for failure in report.failures]
             raise RefusedError("the proof of the roots does not hold")
@@ -237,12 +237,10 @@ class StabilityChecker(ProofChecker):
         if part is None or not isinstance(growing, Growing):
             self.fail(f"root {said.number} is said to run away without one motion that grows")
             return UNDECIDED, None
-        found = growing.found(part.stiffness, part.motions)
-        if found is None:
+        if growing.found(part.stiffness, part.motions) is None:
             self.fail(f"root {said.number}: no motion is proven to grow in the range that is named")
             return UNDECIDED, None
-        low, high = found.mu
-        return RUNS_AWAY, (math.sqrt(low) * _BELOW, math.sqrt(high) * _ABOVE)
+        return RUNS_AWAY, (math.sqrt(growing.low) * _BELOW, math.sqrt(growing.high) * _ABOVE)
 
     def _statuses(self, leaf: Located) -> tuple[list[int], Floats | None] | None:
         """Statuses that hold strictly, and in 3D bounds of lambda_t; None where they are not certain."""

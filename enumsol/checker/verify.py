@@ -85,9 +85,9 @@ def verify(
         return HistoryChecker(problem, header, checker, progress).run(lines)
     report: VerificationReport | GraphVerificationReport
     if kind == "graph":
-        report = graph_checker()(problem, header, progress).run(lines)
+        report = graph_checker()(problem, progress, header=header).run(lines)
     else:
-        report = checker(problem, progress).run(proof)
+        report = checker(problem, progress).run(proof.records)
     return report
 
 

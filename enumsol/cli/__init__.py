@@ -1,4 +1,4 @@
-"""The command line ``enumsol``: one module a command, `enumsol.cli.app` joins them."""
+"""The command line ``enumsol``: a function for each command, which `enumsol.cli.app` joins."""
 
 from __future__ import annotations
 

@@ -11,18 +11,15 @@ from typing import Annotated, cast
 
 import typer
 
-from enumsol.cli.audit import audit, verify
 from enumsol.cli.common import ExitStatus
-from enumsol.cli.fixed_point import fixed_point
-from enumsol.cli.follow import follow
-from enumsol.cli.graph import graph, report
+from enumsol.cli.follow import fixed_point, follow
+from enumsol.cli.graph import audit, graph, report, verify
 from enumsol.cli.history import history
 from enumsol.cli.options import add_command
 from enumsol.cli.problems import collection_app, gallery_app
 from enumsol.cli.progress import guarded_streams, loud_again, say
-from enumsol.cli.roots import roots
+from enumsol.cli.roots import roots, table
 from enumsol.cli.solve import solve
-from enumsol.cli.table import table
 from enumsol.errors import EnumsolError, OutputError
 from enumsol.support.messages import listed
 

@@ -1,26 +1,30 @@
-"""Parts of all commands: the problem and alpha they are given, exit statuses, worker processes."""
+"""Parts of all commands: the problem, deck and alpha they are given, exit statuses, worker processes."""
 
 from __future__ import annotations
 
 import enum
 import os
+import shlex
 import sys
+from collections.abc import Callable
+from contextvars import ContextVar
+from functools import lru_cache, wraps
+from inspect import Parameter
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, NoReturn, TypeVar
+from typing import TYPE_CHECKING, Annotated, Any, NamedTuple, NoReturn, TypeVar
 
 import typer
 
-from enumsol.cli.decks import DECK, deck_named, is_deck, step_chosen
 from enumsol.cli.progress import Display, is_quiet, say
 from enumsol.errors import EnumsolError, Interrupted, InvalidArgumentError, OutOfMemoryError, OutputError
 from enumsol.support.messages import visible
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
     from concurrent.futures import Executor
     from contextlib import AbstractContextManager
 
     from enumsol.fem import Scene
+    from enumsol.fem.deck_scenes import DeckModel
     from enumsol.model.problem3d import AnyProblem
     from enumsol.support.array_types import Alpha
 
@@ -30,6 +34,8 @@ T = TypeVar("T")
 GALLERY, COLLECTION = "gallery:", "collection:"
 #: Ending of files that describe a problem by a mesh and what acts on its parts.
 TOML = ".toml"
+#: Ending of decks.
+DECK = ".inp"
 #: Usual endings of files that meshio reads and that are no problems.
 MESHES = (".msh", ".vtu", ".vtk", DECK, ".xdmf", ".med", ".bdf", ".mesh", ".e", ".exo")
 
@@ -292,3 +298,103 @@ def workers(jobs: int) -> AbstractContextManager[Executor | None]:
     from enumsol.support.workers import workers_of  # not for --help
 
     return workers_of(None, jobs if jobs == 1 else capped(jobs), "--jobs")
+
+
+# -- decks: their options on every command that takes one --------------------------------------------------------------
+
+_IGNORE = "Card of an .inp PROBLEM that is left out though it may change the answer; may be repeated."
+_STEP = "Step of an .inp PROBLEM whose load acts, reached from no load at once; required if it has several."
+_ASSEMBLE = (
+    "Code that assembles the stiffness of an .inp PROBLEM: ccx, an installed CalculiX, which knows all its elements."
+)
+
+
+def _option(name: str, flag: str, kind: Any, **how: Any) -> Parameter:
+    """An option of decks, which is None where it is not given."""
+    said = Annotated[kind | None, typer.Option(flag, rich_help_panel="Decks", **how)]
+    return Parameter(name, Parameter.KEYWORD_ONLY, default=None, annotation=said)
+
+
+#: Options of every command with a PROBLEM.
+OPTIONS = [
+    _option("ignore", "--ignore", list[str], metavar="CARD", help=_IGNORE),
+    _option("deck_step", "--step", int, min=1, metavar="N", help=_STEP),
+    _option("assemble", "--assemble", str, metavar="CODE", help=_ASSEMBLE),
+]
+
+
+class _Chosen(NamedTuple):
+    """Options of a command that are about decks."""
+
+    ignore: tuple[str, ...] = ()
+    step: int | None = None
+    assemble: str | None = None
+
+
+_CHOSEN: ContextVar[_Chosen] = ContextVar("enumsol_deck", default=_Chosen())  # noqa: B039 (it is immutable)
+
+
+def with_decks(
+    command: Callable[..., None], parameters: list[Parameter]
+) -> tuple[Callable[..., None], list[Parameter]]:
+    """A command with a PROBLEM, and its parameters, with the options of decks; others as they are."""
+    if not {"problem", "mesh"} & {parameter.name for parameter in parameters}:
+        return command, parameters
+
+    @wraps(command)
+    def chosen(
+        *, ignore: list[str] | None = None, deck_step: int | None = None, assemble: str | None = None, **given: Any
+    ) -> None:
+        token = _CHOSEN.set(_Chosen(tuple(ignore or ()), deck_step, assemble))
+        try:
+            command(**given)
+        finally:
+            _CHOSEN.reset(token)
+
+    return chosen, [*parameters, *OPTIONS]
+
+
+def is_deck(name: str) -> bool:
+    """True if a PROBLEM is a deck."""
+    return name.lower().endswith(DECK) and not Path(name).is_dir()
+
+
+def deck_named(name: str) -> DeckModel:
+    """The model of a deck, read once; what its cards became is said before all else.
+
+    Raises
+    ------
+    InvalidArgumentError
+        It cannot be read, or has what cannot be used and no option --ignore names.
+    """
+    place = Path(name)
+    return _read(name, place.stat().st_mtime_ns if place.is_file() else 0, _CHOSEN.get())
+
+
+def ignored() -> tuple[str, ...]:
+    """Names that --ignore gives."""
+    return _CHOSEN.get().ignore
+
+
+def step_chosen() -> int | None:
+    """The step that --step names."""
+    return _CHOSEN.get().step
+
+
+def options_said() -> str:
+    """The options of decks that were given, as they stand on a command line."""
+    chosen = _CHOSEN.get()
+    cards = "".join(f" --ignore {shlex.quote(card)}" for card in chosen.ignore)
+    cards += "" if chosen.step is None else f" --step {chosen.step}"
+    return cards + ("" if chosen.assemble is None else f" --assemble {shlex.quote(chosen.assemble)}")
+
+
+@lru_cache(maxsize=1)
+def _read(path: str, changed: int, chosen: _Chosen) -> DeckModel:
+    del changed  # a file that is written anew is read anew
+    from enumsol.fem.deck_scenes import read_deck  # numpy and scikit-fem: not for --help
+
+    model = read_deck(path, ignore=chosen.ignore, assemble=chosen.assemble)
+    if not is_quiet():
+        say(str(model), err=True)
+    return model

@@ -1,4 +1,4 @@
-"""``enumsol follow``: branches of solutions by continuation (paper, Algorithm 5.1)."""
+"""``enumsol follow`` (paper, Algorithm 5.1) and ``enumsol fixed-point``: solutions by iteration."""
 
 from __future__ import annotations
 
@@ -7,10 +7,8 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from enumsol.cli import options
-from enumsol.cli.common import ExitStatus, finish, load_problem, node_row, parse_alpha, parse_interval, units_of
+from enumsol.cli import common, options, output
 from enumsol.cli.graph import read_graph
-from enumsol.cli.output import deliver, taken, write_figure
 from enumsol.cli.progress import Display, search_display
 from enumsol.errors import Interrupted, InvalidArgumentError, OutOfMemoryError
 from enumsol.support.messages import counted
@@ -22,6 +20,7 @@ if TYPE_CHECKING:
 
     from enumsol.branches import BranchGraph
     from enumsol.continuation import ContinuationOptions, Path
+    from enumsol.fixed_points import FixedPoint, FixedPointProgress
     from enumsol.model.problem3d import AnyProblem
     from enumsol.roots.root import Root
     from enumsol.support.array_types import Alpha
@@ -98,9 +97,13 @@ def follow(
         max_steps=max_steps,
         check_steps=check_steps,
     )
-    interval, alpha, signs = parse_interval(first, last), parse_alpha(start, "--start"), _directions(direction)
-    names, body = units_of(problem, units), load_problem(problem)
-    row = node_row(body, node)
+    interval, alpha, signs = (
+        common.parse_interval(first, last),
+        common.parse_alpha(start, "--start"),
+        _directions(direction),
+    )
+    names, body = common.units_of(problem, units), common.load_problem(problem)
+    row = common.node_row(body, node)
     over = None if graph_file is None else read_graph(graph_file, body)
     followed = _Followed(body, (float(interval[0]), float(interval[1])), steps, tangent)
     ended: Interrupted | OutOfMemoryError | None = None
@@ -112,10 +115,10 @@ def follow(
     except MemoryError:
         ended = OutOfMemoryError("out of memory", followed)
     about = {"problem": problem, "start": alpha, "interval": interval}
-    deliver(
+    output.deliver(
         (
             plot_file if followed.paths else None,
-            lambda path: write_figure(path, followed.draw(over, row, quantity, names)),
+            lambda path: output.write_figure(path, followed.draw(over, row, quantity, names)),
         ),
         json_file=json_file,
         csv_file=csv_file,
@@ -123,7 +126,7 @@ def follow(
         content=lambda: {**about, **followed.content()},
         frame=followed.frame,
     )
-    finish(ended, ExitStatus.DONE if followed.arrived else ExitStatus.INCOMPLETE)
+    common.finish(ended, common.ExitStatus.DONE if followed.arrived else common.ExitStatus.INCOMPLETE)
 
 
 def _directions(text: str) -> tuple[int, ...]:
@@ -235,7 +238,7 @@ class _Followed:
     def content(self) -> dict[str, Any]:
         """Everything, for JSON."""
         return {
-            "paths": [{"root": number, "direction": sign, **_content(path)} for number, sign, path in self.found],
+            "paths": [{"root": number, "direction": sign, **_path_content(path)} for number, sign, path in self.found],
             "passed": [{"root": number, "path": k} for number, k in self.passed.items()],
             "failures": [{"root": number, "direction": sign, "reason": why} for number, sign, why in self.failures],
         }
@@ -283,18 +286,105 @@ def _leads_to(path: Path, k: int, root: Root, problem: AnyProblem) -> bool:
     )
 
 
-def _content(path: Path) -> dict[str, Any]:
+def _path_content(path: Path) -> dict[str, Any]:
     return {
-        **taken(path, "status", "message", "closed"),
+        **output.taken(path, "status", "message", "closed"),
         "stats": vars(path.stats),
         "folds": [item.alpha for item in path.folds],
         "transitions": [
             {
-                **taken(item, "alpha", "point", "before", "after"),
+                **output.taken(item, "alpha", "point", "before", "after"),
                 "fold": item in path.folds,
                 "local_branch": None if item.local_test is None else item.local_test.exists,
             }
             for item in path.transitions
         ],
         "points": path.to_frame().to_dict("list"),
+    }
+
+
+# -- fixed point -------------------------------------------------------------------------------------------------------
+# ``enumsol fixed-point``: a solution with Coulomb friction by successive approximations, in 2D and 3D.
+
+#: What a body that nothing holds has beside forces and displacements of its contact nodes.
+_RIGID = ("rigid_coordinates", "rigid_displacement", "free_motion")
+
+
+def fixed_point(
+    problem: options.Problem,
+    alpha: options.Number | None = None,
+    start: Annotated[float | None, typer.Option(metavar="FORCE")] = None,
+    tolerance: float = 1e-10,
+    max_iterations: options.Count = 1000,
+    anderson: Annotated[int, typer.Option(min=0, metavar="N")] = 0,
+    json_file: options.OutputFile | None = None,
+    csv_file: options.OutputFile | None = None,
+    npz_file: options.OutputFile | None = None,
+    vtu_file: options.OutputFile | None = None,
+    units: options.Units | None = None,
+    quiet: options.Quiet = False,
+) -> None:
+    """Find one solution of PROBLEM at one ALPHA, as the limit of contact problems with given slip bounds.
+
+    The iteration converges for small friction. If it converges, its limit is a solution; there may be others: enumsol
+    roots finds all of them, if the coefficients of friction do not depend on the slip. For a body that nothing holds it
+    may come to slip bounds within which no forces hold the body, and then ends without one.
+
+    Exit status: 0 if the iteration converged; 3 if not; 2 on bad input; 130 on
+    Ctrl-C, after printing the last iterate; 74 if a result could not be written; 141 if the program that read it has
+    ended.
+
+    Parameters
+    ----------
+    alpha : Parameter value: a number or a fraction; may be omitted if nothing depends on it.
+    start : Initial slip bound of every node, by default 0; of a body that nothing holds all nodes stick then.
+    tolerance : Size of a step, relative to the load, at which the iteration has converged.
+    max_iterations : Largest number of Tresca problems that are solved.
+    anderson : Mix the last N steps (Anderson).
+    csv_file : Write a table with one row per contact node; - is stdout.
+    npz_file : Write all arrays, for FixedPoint.load.
+    """
+    body, names = common.load_problem(problem), common.units_of(problem, units)
+    value = common.alpha_of(alpha, problem, body)
+    options: dict[str, Any] = {"tolerance": tolerance, "max_iterations": max_iterations, "anderson": anderson}
+    output.check_places(vtu_file, body, problem)
+    found, ended = common.so_far(lambda: _approximate(body, value, start, options))
+
+    def show(path: str) -> None:
+        from enumsol.io.vtu import write_vtu  # numpy: not for --help
+
+        write_vtu(body, found, path)
+
+    output.deliver(
+        (npz_file, found.save),
+        (vtu_file, show),
+        json_file=json_file,
+        csv_file=csv_file,
+        text=lambda: common.in_units(repr(found), names),
+        content=lambda: _content(found, problem),
+        frame=found.to_frame,
+    )
+    common.finish(ended, common.ExitStatus.DONE if found.converged else common.ExitStatus.INCOMPLETE)
+
+
+def _approximate(body: AnyProblem, alpha: Alpha, start: float | None, options: dict[str, Any]) -> FixedPoint:
+    from enumsol.fixed_points import successive_approximations  # numpy and scipy: not for --help
+
+    def told(state: FixedPointProgress) -> tuple[float, str]:
+        return min(1.0, 1.0 / max(state.increment, 1e-300)), f"iteration {state.iteration}"
+
+    with Display("iterating", told=told) as display:
+        return successive_approximations(body, alpha, start, progress=display, **options)
+
+
+def _content(found: FixedPoint, name: str) -> dict[str, Any]:
+    return {
+        "problem": name,
+        "alpha": float(found.alpha),
+        "alpha_text": str(found.alpha),
+        **output.taken(found, "converged", "outcome", "why", "iterations", "contraction_factor", "residuals"),
+        "node_ids": found.problem.node_ids,
+        **output.taken(found, "statuses", "coefficients", "lambda_n", "lambda_t", "u_n", "u_t"),
+        **({} if found.rigid_coordinates is None else output.taken(found, *_RIGID)),
+        "increments": found.increments,
     }

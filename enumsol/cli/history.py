@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 import typer
 
 from enumsol.cli import common, output
-from enumsol.cli.decks import deck_named, is_deck, step_chosen
+from enumsol.cli.common import deck_named, is_deck, step_chosen
 from enumsol.cli.options import PLOT, Arithmetic, Count, OutputFile, PlotFile, Problem, Quiet, Seconds, Title, Units
 from enumsol.cli.progress import Display
 from enumsol.errors import InvalidArgumentError

@@ -24,8 +24,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal, Union, get_args, get_
 import typer
 from typer.core import TyperCommand
 
-from enumsol.cli.common import TOML
-from enumsol.cli.decks import DECK, with_decks
+from enumsol.cli.common import DECK, TOML, with_decks
 from enumsol.cli.progress import set_quiet
 from enumsol.errors import InvalidArgumentError, MissingDependencyError
 from enumsol.support.files import check_replaceable

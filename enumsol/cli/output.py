@@ -20,10 +20,11 @@ from typing import TYPE_CHECKING, Any
 
 import typer
 
-from enumsol.cli.decks import options_said
+from enumsol.cli.common import options_said
 from enumsol.cli.progress import is_quiet, pour, say
 from enumsol.errors import InvalidArgumentError, MissingDependencyError, OutputError
 from enumsol.support.files import write_file
+from enumsol.support.messages import aligned
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
@@ -209,20 +210,8 @@ def list_entries(
             return
     if not sys.stdout.isatty():
         # for other programs: one line per problem, however long
-        widths = [max(len(row[k]) for row in rows) for k in range(len(columns) - 1)]
         # written at once: nothing is left to write when a reader has read enough (| head)
-        say(
-            "\n".join(
-                "  ".join(
-                    [
-                        f"{row[0]:<{widths[0]}}",
-                        *(f"{item:>{width}}" for item, width in zip(row[1:-1], widths[1:], strict=True)),
-                        row[-1],
-                    ]
-                )
-                for row in rows
-            )
-        )
+        say("\n".join(aligned(rows, free=True)))
         return
     from rich.console import Console
     from rich.table import Table

@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING, Annotated, Any, NamedTuple
 
 import typer
 
+from enumsol.cli import common
 from enumsol.cli.common import GALLERY, TOML, note, parse_alpha, refuse_misspelt, scene_of, units_of
-from enumsol.cli.decks import ignored, is_deck
 from enumsol.cli.options import LIMITS, OUTPUT, Argument, OutputFile, OutputFlag, Quiet, options_of, with_options
 from enumsol.cli.output import deliver, write_figure
 from enumsol.cli.progress import Display
@@ -313,7 +313,9 @@ def solve(
         if output is not None:
             return
         raise InvalidArgumentError("--alpha is missing, on which friction or load depend; expected it, or --output")
-    source = output if output is not None else mesh if mesh.endswith(TOML) or (is_deck(mesh) and not given) else None
+    source = (
+        output if output is not None else mesh if mesh.endswith(TOML) or (common.is_deck(mesh) and not given) else None
+    )
     search.answer(mesh, problem, value or 0.0, source, scene)
 
 
@@ -331,7 +333,7 @@ def _scene(mesh: str, options: dict[str, Any]) -> Scene:
             flag = _flags(next(iter(options)))[0]
             raise InvalidArgumentError(f"{flag} is given beside {mesh}, which has all options; expected it there")
         refuse_misspelt(mesh)
-    whole = scene_of(mesh) if mesh.endswith(TOML) or (is_deck(mesh) and not options) else None
+    whole = scene_of(mesh) if mesh.endswith(TOML) or (common.is_deck(mesh) and not options) else None
     if whole is not None:
         return whole
     place = file_path(mesh, "MESH", "the name of a mesh file")
@@ -342,7 +344,8 @@ def _scene(mesh: str, options: dict[str, Any]) -> Scene:
         raise InvalidArgumentError(f"{mesh}: {found}; expected a mesh with named parts, or a {TOML} file")
     check_keys(options, lambda name: _flags(name)[0])
     written = lambda name, part, number: f"{_flags(name)[0]} {part and f'{part}='}{number}"  # noqa: E731
-    source = fem.read_mesh(mesh, ignore=ignored()) if ignored() else mesh
+    cards = common.ignored()
+    source = fem.read_mesh(mesh, ignore=cards) if cards else mesh
     return fem.mesh_scene(refuse_old_friction(source, options, written), **options)
 
 

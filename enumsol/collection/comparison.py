@@ -15,17 +15,17 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from enumsol.auditing.known_solutions import KnownSolutions
+from enumsol.auditing.results import KnownSolutions
 from enumsol.collection.entries import COLLECTION, INDEX, CertifiedSolutions, CollectionEntry, get
 from enumsol.errors import InvalidArgumentError, MissingDependencyError
 from enumsol.fixed_points.tresca import TrescaState
-from enumsol.io.fclib import child, numbers
+from enumsol.io.array_files import child, numbers
 from enumsol.roots.root import summary
 from enumsol.support.arguments import file_path, positive_number
 from enumsol.support.array_arguments import real_array
 from enumsol.support.array_types import Floats
 from enumsol.support.files import reading, unreadable
-from enumsol.support.messages import counted, html_lines, shortened
+from enumsol.support.messages import aligned, counted, html_lines, shortened
 from enumsol.support.saved import archive_arrays, json_from, table_text
 
 if TYPE_CHECKING:
@@ -255,12 +255,7 @@ largest residual is 3.1e-01 (dissipation)
         return about | {"problems": [report.record() for report in self.problems], "not_tried": self.not_tried}
 
     def __repr__(self) -> str:
-        rows = [_HEADS, *(report.row() for report in self.problems)]
-        widths = [max(len(row[k]) for row in rows) for k in range(len(_HEADS))]
-        table = [
-            f"{row[0]:<{widths[0]}}  " + "  ".join(f"{c:>{w}}" for c, w in zip(row[1:], widths[1:], strict=True))
-            for row in rows
-        ]
+        table = aligned([_HEADS, *(report.row() for report in self.problems)])
         good, tried = sum(report.ok for report in self.problems), counted(len(self.problems), "problem")
         return "\n".join(
             [

@@ -13,9 +13,8 @@ import numpy as np
 import scipy.sparse as sp
 
 from enumsol.arithmetic.balls import SAFE, TINY, UNIT, Ball, Inverse
-from enumsol.condensation.enclosure import CondensedEnclosure, NotEnclosedError
+from enumsol.condensation.enclosure import CondensedEnclosure, NotEnclosedError, Products, product
 from enumsol.condensation.factorization import Factorization
-from enumsol.condensation.products import Products
 from enumsol.errors import InvalidProblemError
 
 if TYPE_CHECKING:
@@ -111,7 +110,8 @@ class DynamicStiffness:
         springs: Any = None,
         rest: Ball | None = None,
     ) -> None:
-        self.A, self.M, self.rows, self._modes, self.springs = A, M, rows, modes, springs
+        self.A, self.M, self.rows, self.springs = A, M, rows, springs
+        self._modes = np.zeros((A.shape[0], 0)) if modes is None else modes
         self._rest, self._known = rest, dict[float, Ball | None]()
 
     def at(self, mu: float) -> Ball | None:
@@ -128,7 +128,7 @@ class DynamicStiffness:
     @property
     def held(self) -> bool:
         """True if A is positive definite: K(mu) is there for some mu < 0, too."""
-        return self._modes is None or not self._modes.shape[1]
+        return not self._modes.shape[1]
 
     @property
     def known(self) -> list[float]:
@@ -215,8 +215,8 @@ class DynamicStiffness:
             if self.held:
                 return K @ Pencil(self.A, rows).compliance()[:m, m]
             _, share, inverse = self._on_springs
-            h = _moved(sp.csr_array(load[None, :]), self._modes)
-            balance = inverse.solve(Ball(h.mid.T, h.rad.T))
+            h = product(sp.csr_array(load[None, :]), self._modes)
+            balance = inverse.solve(h.T)
             return K @ self._springs_and(rows)[:m, m] + (share @ balance)[:, 0]
         except NotEnclosedError:
             return None
@@ -225,9 +225,9 @@ class DynamicStiffness:
     def _on_springs(self) -> tuple[Ball, Ball, Inverse]:
         """K of the body on springs, K G', and what solves with G K G'."""
         K = self._inverse(self._springs_and(self.rows))
-        G = _moved(self.rows, self._modes)
+        G = product(self.rows, self._modes)
         share = K @ G
-        inverse = Inverse.of(Ball(G.mid.T, G.rad.T) @ share)
+        inverse = Inverse.of(G.T @ share)
         if inverse is None:
             raise NotEnclosedError("some rigid displacement moves no node in contact")
         return K, share, inverse
@@ -240,7 +240,7 @@ class DynamicStiffness:
     def _slow(self) -> Ball:
         """K(0) of a body that nothing holds: stiffness against all but the rigid motions (theory, (15.5))."""
         K, share, inverse = self._on_springs
-        return (K - share @ inverse.solve(Ball(share.mid.T, share.rad.T))).symmetric
+        return (K - share @ inverse.solve(share.T)).symmetric
 
     @staticmethod
     def _inverse(S: Ball) -> Ball:
@@ -250,9 +250,3 @@ class DynamicStiffness:
         if inverse is None:
             raise NotEnclosedError("S(mu) is not proven regular")
         return inverse.whole().symmetric
-
-
-def _moved(rows: sp.csr_array, modes: Any) -> Ball:
-    """B N, (m, r)."""
-    size = abs(rows) @ np.abs(modes)
-    return Ball(np.asarray(rows @ modes), np.asarray(size * (modes.shape[0] + 2) * 2 * UNIT * SAFE + TINY))

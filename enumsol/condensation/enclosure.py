@@ -1,15 +1,15 @@
 """Rigorous enclosures of the condensed problem, from the user's own A, Bn, Bt, f (theory, section 4.4).
 
-S and g as computed, with the bounds of their errors, are in ``condensation.products``.
+`Products` are B A^{-1} [B', f, load_slope] in floats, with what bounds their errors.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 from fractions import Fraction
 from functools import cached_property
-from typing import Any, ClassVar, Self
+from typing import Any, ClassVar, Self, TypeVar
 
 import numpy as np
 import scipy.sparse as sp
@@ -19,22 +19,150 @@ from enumsol.arithmetic.balls import (
     TINY,
     UNIT,
     Ball,
-    dense_eigenvalue_bound,
+    SlicedMatrix,
     gamma,
+    least_eigenvalue,
+    nearest,
     sparse_eigenvalue_bound,
     upper_norm,
 )
 from enumsol.condensation.data import ProblemData, exactly_at
-from enumsol.condensation.products import Products, product, scaled
 from enumsol.errors import EnumsolError
 from enumsol.support.arguments import alpha_value
 from enumsol.support.array_types import AlphaLike, Floats, Mask
-from enumsol.support.deadlines import attended
+from enumsol.support.deadlines import attended, look, tell
 from enumsol.support.immutable import Sealed
+
+_Value = TypeVar("_Value")
 
 
 class NotEnclosedError(EnumsolError):
     """The data could not be enclosed: A or S is positive definite only within rounding, or float64 overflows."""
+
+
+@dataclass(frozen=True)
+class Products(Sealed):
+    """S = B A^{-1} B' and what the loads move, as computed, before anything is known of A's smallest eigenvalue.
+
+    With X an approximation of A^{-1} K, K = [B', f, load_slope], R = K - A X its residual and Y an approximation of
+    A^{-1} R,
+
+        B A^{-1} K  =  B X  +  B Y  +  B A^{-1} (R - A Y),      |b_i' A^{-1} z|  <=  ||A^{-1} b_i|| ||z||,
+
+    where ||A^{-1} b_i|| <= ||X_i + Y_i|| + ||(R - A Y)_i|| / lambda_min(A). So the error is that of the rounding of two
+    sums and of second order in the residual, which is computed in more than the working precision.
+
+    Attributes
+    ----------
+    mid : (m, m + 2) array
+        B X + B Y, of loads divided by ``lift``.
+    rounded : (m, m + 2) array
+        Bounds of its rounding errors.
+    lengths, left : (m + 2,) arrays
+        Bounds of ||X + Y|| and ||R - A Y||, A scaled by ``scale`` to a diagonal near one.
+    scale : (n,) array of powers of two
+    lift : (2,) array of powers of two
+    still : (2,) bool array
+        Loads that are zero.
+    bounded : bool
+        Whether the data could be scaled without rounding. Without it nothing bounds the errors.
+    """
+
+    mid: Floats
+    rounded: Floats
+    lengths: Floats
+    left: Floats
+    scale: Floats
+    lift: Floats
+    still: Mask
+    bounded: bool
+
+    @classmethod
+    def of(cls, problem: ProblemData, *, refined: bool = True) -> Products:
+        """Products of a problem; if they are not refined, Y = 0, and the error is of first order in the residual."""
+        return cls._of(problem, problem.contact_rows.shape[0], refined=refined)
+
+    def with_loads_of(self, problem: ProblemData) -> Products:
+        """Products for another load on the same matrices: only the columns of the load are solved for."""
+        loads, rows = self._of(problem, 0), len(self.mid)
+        columns = {
+            name: np.concatenate([getattr(self, name)[..., :rows], getattr(loads, name)], axis=-1)
+            for name in ("mid", "rounded", "lengths", "left")
+        }
+        return replace(loads, **columns, bounded=self.bounded and loads.bounded)
+
+    @classmethod
+    def _of(cls, problem: ProblemData, columns: int, *, refined: bool = True) -> Products:
+        """Products with the first columns of B' and with the loads."""
+        with np.errstate(over="ignore", invalid="ignore", divide="ignore"):
+            # np.ldexp, and not a power function, gives powers of two by definition
+            exponent = -np.round(0.5 * np.log2(problem.A.diagonal())).astype(int)
+            scale = np.ldexp(1.0, exponent)
+            A, exact_A = scaled(sp.csr_array(problem.A), scale, scale)
+            B, exact_B = scaled(problem.contact_rows, np.ones(problem.contact_rows.shape[0]), scale)
+            slope = np.zeros(problem.n) if problem.load_slope is None else problem.load_slope
+            loads = np.column_stack([problem.f, slope])
+            # loads of size one, so that norms of their residuals neither overflow nor underflow
+            size = np.max(np.where(loads != 0, np.frexp(loads)[1] + exponent[:, None], -1000), axis=0)
+            lift = np.clip(size, -1000, 1000)
+            power = exponent[:, None] - lift
+            K = sp.hstack([B.T[:, :columns], sp.csc_array(np.ldexp(loads, power))], format="csc")
+            exact_loads = np.array_equal(np.ldexp(np.ldexp(loads, power), -power), loads)
+
+            def solve(columns: Floats) -> Floats:
+                # not refined: what is left is bounded
+                return np.asarray(problem.factorization.solve(columns / scale[:, None], refined=False) / scale[:, None])
+
+            k = gamma(int(np.max(np.diff(B.indptr))) + 1)
+            B_size, sliced = abs(B), SlicedMatrix(A) if refined else None
+            mid, rounded = np.empty((B.shape[0], K.shape[1])), np.empty((B.shape[0], K.shape[1]))
+            lengths, left = np.empty(K.shape[1]), np.empty(K.shape[1])
+            width = problem.factorization.columns
+            for start in range(0, K.shape[1], width):
+                look()
+                tell("columns of A^-1 B'", start, K.shape[1])
+                part = slice(start, min(start + width, K.shape[1]))
+                given = K[:, part].toarray()
+                X = solve(given)
+                if sliced is None:
+                    image, Y = product(A, X), np.zeros_like(X)
+                    rest = given - image.mid
+                    R_rad, rest_rad = image.rad, 2 * UNIT * np.abs(rest)
+                else:
+                    R, R_rad = sliced.residual(X, given)
+                    Y = solve(R)
+                    rest, rest_rad = sliced.residual(Y, R)
+                mid[:, part] = B @ X + B @ Y
+                left[part] = upper_norm((np.abs(rest) + rest_rad + R_rad) * SAFE, axis=0) * SAFE
+                sizes = np.abs(X) + np.abs(Y)
+                rounded[:, part] = (k * (B_size @ sizes) * (1 + 2 * k) + 2 * UNIT * np.abs(mid[:, part])) * SAFE
+                lengths[part] = upper_norm(sizes, axis=0) * SAFE
+            bounded = exact_A and exact_B and exact_loads
+            return cls(mid, rounded, lengths, left, scale, np.ldexp(1.0, lift), ~np.any(loads, axis=0), bounded)
+
+    def radii(self, bound: float) -> Floats:
+        """Bounds of all errors, for a lower bound on the smallest eigenvalue of the scaled A."""
+        rows = len(self.mid)
+        lengths = (self.lengths[:rows] + self.left[:rows] / bound) * SAFE
+        return (self.rounded + lengths[:, None] * self.left) * SAFE + (len(self.scale) + 2) * TINY
+
+
+def scaled(matrix: sp.csr_array, left: Floats, right: Floats) -> tuple[sp.csr_array, bool]:
+    """diag(left) matrix diag(right) for powers of two, and whether that is exact."""
+    rows = np.repeat(np.arange(matrix.shape[0]), np.diff(matrix.indptr))
+    factor = left[rows] * right[matrix.indices]
+    data = matrix.data * factor
+    exact = bool(np.all(np.isfinite(data))) and np.array_equal(data / factor, matrix.data)
+    return sp.csr_array((data, matrix.indices, matrix.indptr), shape=matrix.shape), exact
+
+
+def product(left: Floats | sp.csr_array, right: Floats) -> Ball:
+    """The product of two matrices, the first of which may be sparse, with the error of its sums; zeros are exact."""
+    mid = np.asarray(left @ right)
+    size = np.asarray(abs(left) @ np.abs(right))
+    terms = int(np.max(np.diff(sp.csr_array(left).indptr))) if sp.issparse(left) else left.shape[1]
+    k = gamma(terms + 2)
+    return Ball(mid, np.where(size > 0, size * k * (1 + 2 * k) * SAFE + TINY, 0.0))
 
 
 @dataclass(frozen=True)
@@ -86,22 +214,16 @@ class CondensedEnclosure(Sealed):
         NotEnclosedError
             Something over- or underflows.
         """
-        if not products.bounded:
-            raise NotEnclosedError(_OVERFLOW)
-        bound = self.stiffness_bound
         with np.errstate(over="ignore", invalid="ignore", divide="ignore"):
-            g0, g0_rad, g1, g1_rad, *free = _displaced(problem, products, products.radii(bound))
-        S = self.S, self.S_rad
-        return CondensedEnclosure(*S, g0, g0_rad, g1, g1_rad, bound, problem, (free[0], free[1]))._finite()
+            return self._from_problem(problem, products, self)._finite()
 
     def moved_freely(self, alpha: Fraction) -> Ball:
         """B A^-1 f(alpha), where the contact nodes would be without contact, shape (2p,) [length]."""
         if self.free is None:
             raise AssertionError(_PART)
-        value, slack = float_at(alpha)
         with np.errstate(over="ignore", invalid="ignore"):
-            moved = Ball(np.array(value), np.array(slack)) * Ball(self.g1, self.g1_rad) + Ball(*self.free)
-        if not np.all(np.isfinite(moved.mid)) or not np.all(np.isfinite(moved.rad)):
+            moved = nearest([alpha])[0] * Ball(self.g1, self.g1_rad) + Ball(*self.free)
+        if not moved.finite:
             raise NotEnclosedError(_OVERFLOW)
         return moved
 
@@ -127,37 +249,31 @@ class CondensedEnclosure(Sealed):
         return self
 
     @classmethod
-    def _from_problem(cls, problem: ProblemData, products: Products | None) -> CondensedEnclosure:
+    def _from_problem(
+        cls, problem: ProblemData, products: Products | None, before: CondensedEnclosure | None = None
+    ) -> CondensedEnclosure:
+        """Balls of a problem, of the same body as one ``before`` if there is that."""
         products = Products.of(problem) if products is None else products
         if not products.bounded:
             raise NotEnclosedError(_OVERFLOW)
-        scale, size = products.scale, len(products.mid)
-        A, _ = scaled(sp.csr_array(problem.A), scale, scale)
-        estimate = _smallest_eigenvalue(problem, scale)
-        bound = attended(
-            lambda: sparse_eigenvalue_bound(sp.csc_array(A), estimate), A.nnz, "bound of the smallest eigenvalue of A"
-        )
-        if not bound > 0:
-            raise NotEnclosedError(
-                "A is positive definite only within rounding: its smallest eigenvalue, after scaling to a unit "
-                "diagonal, could not be proven positive"
-            )
-        mid, rad = products.mid, products.radii(bound)
-        S, S_rad = mid[:, :size], rad[:, :size]
+        bound = _stiffness_bound(problem, products.scale) if before is None else before.stiffness_bound
+        rad, size = products.radii(bound), len(products.mid)
+        g0, g0_rad, g1, g1_rad, *free = _displaced(problem, products, rad)
+        load = g0, g0_rad, g1, g1_rad, bound, problem, (free[0], free[1])
+        if before is not None:
+            return cls(before.S, before.S_rad, *load)
+        S, S_rad = products.mid[:, :size], rad[:, :size]
         # the exact S is symmetric and lies in both triangles' balls
         sym = 0.5 * (S + S.T)
         S_rad = (np.maximum(S_rad, S_rad.T) + np.abs(S - S.T) + 2 * UNIT * np.abs(sym)) * SAFE
-        g0, g0_rad, g1, g1_rad, *free = _displaced(problem, products, rad)
-        return cls(sym, S_rad, g0, g0_rad, g1, g1_rad, bound, problem, (free[0], free[1]))
+        return cls(sym, S_rad, *load)
 
     def at(self, alpha: AlphaLike, force: Floats, length: Floats) -> EnclosedSystem:
         """The enclosed system of a 2D problem at one alpha, in units given by powers of two (see ScaledSystem)."""
         a = alpha if isinstance(alpha, Fraction) else Fraction(alpha_value(alpha))
-        exact = exactly_at(a, *self.problem.affine_friction)
-        F, inexact = nearest_floats(exact)
-        F_rad = np.where(inexact, 2 * UNIT * F + TINY, 0.0)
+        F = coefficients(exactly_at(a, *self.problem.affine_friction))
         S, S_rad, g, g_rad = self.in_units(a, force, length)
-        return EnclosedSystem(S, S_rad, g, g_rad, F, F_rad, rows=RigidRows.of(self.problem, a, force, length))
+        return EnclosedSystem(S, S_rad, g, g_rad, F.mid, F.rad, rows=RigidRows.of(self.problem, a, force, length))
 
     def constant_load(self, side: float) -> CondensedEnclosure:
         """Enclosure with g = side g1 at every alpha, ``side`` 1 or -1: what solutions are beside a zero of g."""
@@ -179,7 +295,7 @@ class CondensedEnclosure(Sealed):
             # scaling rounds nothing but what underflows
             pair = force[:, None] / length[None, :]
             S, S_rad = self.S * pair, self.S_rad * pair + TINY
-        if not np.all(pair >= _LEAST_PAIR) or not all(np.all(np.isfinite(array)) for array in (S, S_rad)):
+        if not np.all(pair >= LEAST_PAIR) or not all(np.all(np.isfinite(array)) for array in (S, S_rad)):
             raise NotEnclosedError(_OVERFLOW)
         return S, S_rad, g, g_rad
 
@@ -193,7 +309,8 @@ class CondensedEnclosure(Sealed):
         """
         if np.any(np.frexp(length)[0] != 0.5):
             raise AssertionError(_POWERS)
-        value, slack = float_at(alpha)
+        near = nearest([alpha])
+        value, slack = float(near.mid[0]), float(near.rad[0])
         with np.errstate(over="ignore", invalid="ignore"):
             g = self.g0 + value * self.g1
             size = np.abs(value * self.g1)
@@ -212,43 +329,26 @@ def enclosure_of(problem: ProblemData) -> CondensedEnclosure:
 
 
 #: Smallest quotient of units, far above underflow.
-_LEAST_PAIR = 2.0**-1000
+LEAST_PAIR = 2.0**-1000
 _OVERFLOW = "the condensed problem over- or underflows float64; expected data in other units"
 _PART = "these balls are not those of a whole problem"
 _POWERS = "units of force and length must be powers of two"
 
 
-def nearest_floats(exact: Sequence[Fraction]) -> tuple[Floats, Mask]:
-    """Friction coefficients in floats, and which of them are rounded.
+def coefficients(exact: Sequence[Fraction]) -> Ball:
+    """Friction coefficients as balls.
 
     Raises
     ------
     NotEnclosedError
         One over- or underflows.
     """
-    try:
-        F = np.array([float(x) for x in exact])
-    except OverflowError:
-        raise NotEnclosedError(_OVERFLOW) from None
-    inexact = np.array([Fraction(x) != y for x, y in zip(F.tolist(), exact, strict=True)])
-    if np.any(inexact & (F == 0)):
+    F = nearest(exact)
+    if not F.finite:
+        raise NotEnclosedError(_OVERFLOW)
+    if np.any((F.rad > 0) & (F.mid == 0)):
         raise NotEnclosedError("a friction coefficient underflows float64")
-    return F, inexact
-
-
-def float_at(alpha: Fraction) -> tuple[float, float]:
-    """The float next to alpha, and how far it may be away.
-
-    Raises
-    ------
-    NotEnclosedError
-        There is none.
-    """
-    try:
-        value = float(alpha)
-    except OverflowError:
-        raise NotEnclosedError(_OVERFLOW) from None
-    return value, 0.0 if Fraction(value) == alpha else 2 * UNIT * abs(value) + TINY
+    return F
 
 
 def _displaced(problem: ProblemData, products: Products, rad: Floats) -> tuple[Floats, ...]:
@@ -265,8 +365,15 @@ def _displaced(problem: ProblemData, products: Products, rad: Floats) -> tuple[F
     return g0, g0_rad, free[:, 1], free_rad[:, 1], free[:, 0], free_rad[:, 0]
 
 
-def _smallest_eigenvalue(problem: ProblemData, scale: Floats) -> float:
-    """Estimate of the smallest eigenvalue of the scaled A by inverse iteration."""
+def _stiffness_bound(problem: ProblemData, scale: Floats) -> float:
+    """Proven lower bound on the smallest eigenvalue of the scaled A, from an estimate by inverse iteration.
+
+    Raises
+    ------
+    NotEnclosedError
+        None that is positive was found.
+    """
+    A, _ = scaled(sp.csr_array(problem.A), scale, scale)
     vector = np.random.default_rng(1).normal(size=problem.n)
     value = 1.0
     for _ in range(4):
@@ -274,7 +381,15 @@ def _smallest_eigenvalue(problem: ProblemData, scale: Floats) -> float:
         image = problem.factorization.solve(vector / scale, refined=False) / scale
         value = 1.0 / float(np.linalg.norm(image))
         vector = image
-    return value
+    bound = attended(
+        lambda: sparse_eigenvalue_bound(sp.csc_array(A), value), A.nnz, "bound of the smallest eigenvalue of A"
+    )
+    if not bound > 0:
+        raise NotEnclosedError(
+            "A is positive definite only within rounding: its smallest eigenvalue, after scaling to a unit diagonal, "
+            "could not be proven positive"
+        )
+    return bound
 
 
 def moved_by_modes(problem: ProblemData) -> Ball:
@@ -330,9 +445,8 @@ class RigidRows:
         rows = cls.along(problem, force, length)
         if not np.any(rows.slope.size):
             return rows
-        value, slack = float_at(alpha)
         with np.errstate(over="ignore", invalid="ignore"):
-            h = rows.h + Ball(np.array(value), np.array(slack)) * rows.slope
+            h = rows.h + nearest([alpha])[0] * rows.slope
         if not h.finite:
             raise NotEnclosedError(_RIGID_OVERFLOW)
         return replace(rows, h=h)
@@ -366,6 +480,18 @@ class RigidRows:
         return cls(rows, loads[0], loads[1] if len(loads) > 1 else Ball.exact(np.zeros(len(unit))), unit, reach)
 
 
+def of_compliance(compute: Callable[[Any], _Value]) -> cached_property[_Value]:
+    """A value that follows from S alone, and is that of another system with the same S where one is known."""
+    name = compute.__name__
+
+    def value(system: EnclosedSystem) -> _Value:
+        found: _Value = compute(system) if system.fixed is None else getattr(system.fixed, name)
+        return found
+
+    value.__doc__ = compute.__doc__
+    return cached_property(value)
+
+
 #: Stands for those of a body that is held, of any number of contact forces.
 _NO_ROWS = RigidRows.none(0)
 
@@ -382,6 +508,8 @@ class EnclosedSystem:
     g, g_rad : (2p,) arrays
     F, F_rad : (p,) arrays
     rows : RigidRows, by default none
+    fixed : EnclosedSystem or None
+        One with the same S, from which comes what follows from that alone.
     tangents : int
         Tangential directions of a contact node: 1 in 2D, 2 in 3D.
     """
@@ -395,6 +523,7 @@ class EnclosedSystem:
     F: Floats
     F_rad: Floats
     rows: RigidRows = field(kw_only=True, default=_NO_ROWS)
+    fixed: EnclosedSystem | None = field(kw_only=True, default=None, repr=False)
 
     def __post_init__(self) -> None:
         if self.rows is _NO_ROWS:
@@ -421,7 +550,7 @@ class EnclosedSystem:
         )
         return Ball(mid, rad), Ball.joined(Ball(self.g, self.g_rad), self.rows.h), Ball(self.F, self.F_rad)
 
-    @cached_property
+    @of_compliance
     def smallest_eigenvalue(self) -> float:
         """Proven lower bound on the smallest eigenvalue of every S in the enclosure.
 
@@ -431,7 +560,7 @@ class EnclosedSystem:
             S is not proven positive definite.
         """
         with np.errstate(over="ignore", invalid="ignore"):
-            bound = (dense_eigenvalue_bound(self.S) - float(upper_norm(self.S_rad))) / SAFE
+            bound = least_eigenvalue(Ball(self.S, self.S_rad))
         if not bound > 0:
             raise NotEnclosedError("the condensed compliance S is positive definite only within rounding")
         return bound
@@ -474,11 +603,7 @@ class EnclosedSystem:
     @property
     def largest_unknowns(self) -> float:
         """A bound of the norm of all unknowns, (lambda, q), at a root within the bounds."""
-        return (
-            float(np.hypot(self.largest_forces, upper_norm(self.reach)) * SAFE)
-            if len(self.reach)
-            else self.largest_forces
-        )
+        return float(np.hypot(self.largest_forces, upper_norm(self.reach)) * SAFE)
 
     @cached_property
     def mode_inverse(self) -> Floats:
@@ -486,12 +611,12 @@ class EnclosedSystem:
         G = self.rows.G.mid
         return np.asarray(np.linalg.pinv(G @ self.inverse @ G.T, hermitian=True))
 
-    @cached_property
+    @of_compliance
     def inverse(self) -> Floats:
         """Approximate inverse of S; no claim rests on its accuracy."""
         return np.asarray(np.linalg.inv(self.S))
 
-    @cached_property
+    @of_compliance
     def form_error(self) -> float:
         """kappa with |fl(x'S x) - x'S x| <= kappa ||x||^2 for every S in the enclosure.
 

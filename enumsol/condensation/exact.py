@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from fractions import Fraction
 from functools import cached_property
 from math import lcm
@@ -227,6 +227,8 @@ class ExactCondensed:
         the checker finds it. Nothing is special about it where nothing holds the body.
     reach : tuple of r fmpq
         Bounds of the coordinates of a rigid displacement; none of a body that is held.
+    friction_unit, force : int and fmpq
+        See ``integers``.
     """
 
     rows: tuple[tuple[Any, ...], ...]
@@ -237,6 +239,8 @@ class ExactCondensed:
     condensed_exactly: bool
     zero: Fraction | None
     reach: tuple[Any, ...] = ()
+    friction_unit: int = 1
+    force: Any = 1
 
     @classmethod
     def from_problem(cls, problem: ProblemData) -> ExactCondensed:
@@ -304,20 +308,15 @@ class ExactCondensed:
         return None if self.zero is None else rational(self.zero)
 
     @cached_property
-    def integers(self) -> _Integers:
-        """Data as integers over common denominators."""
+    def integers(self) -> ExactCondensed:
+        """Data as integers over common denominators: forces are in units of ``force``, F in ``friction_unit`` parts."""
         dS = lcm(*(int(v.q) for row in self.rows for v in row))
         dg = lcm(*(int(v.q) for v in (*self.g0, *self.g1)))
         dF = lcm(*(int(v.q) for v in (*self.F0, *self.F1)))
-        return _Integers(
-            tuple(tuple(_times(v, dS) for v in row) for row in self.rows),
-            tuple(_times(v, dg) for v in self.g0),
-            tuple(_times(v, dg) for v in self.g1),
-            tuple(_times(v, dF) for v in self.F0),
-            tuple(_times(v, dF) for v in self.F1),
-            dF,
-            fmpq(dS, dg),
-        )
+        rows = tuple(tuple(_times(v, dS) for v in row) for row in self.rows)
+        g0, g1 = (tuple(_times(v, dg) for v in part) for part in (self.g0, self.g1))
+        F0, F1 = (tuple(_times(v, dF) for v in part) for part in (self.F0, self.F1))
+        return replace(self, rows=rows, g0=g0, g1=g1, F0=F0, F1=F1, friction_unit=dF, force=fmpq(dS, dg))
 
     def at(self, alpha: object) -> tuple[tuple[Any, ...], tuple[Any, ...]]:
         """g and F at an alpha of any exact field."""
@@ -328,19 +327,6 @@ class ExactCondensed:
     def system(self, alpha: object) -> ExactSystem:
         """The condensed problem at an alpha of any exact field."""
         return ExactSystem(self.S, *self.at(alpha), self.reach)
-
-
-@dataclass(frozen=True)
-class _Integers:
-    """Integer data: S = S_int / dS, g = g_int / dg, F = F_int / dF."""
-
-    S: tuple[tuple[Any, ...], ...]
-    g0: tuple[Any, ...]
-    g1: tuple[Any, ...]
-    F0: tuple[Any, ...]
-    F1: tuple[Any, ...]
-    friction_unit: int  # dF
-    force: Any  # dS / dg
 
 
 #: S as a tuple of rows, g0, g1, F0, F1.

@@ -12,14 +12,14 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from enumsol.arithmetic.balls import SAFE, TINY, UNIT, Ball, gamma, upper_norm
+from enumsol.arithmetic.balls import SAFE, TINY, UNIT, Ball, gamma, nearest, upper_norm
 from enumsol.condensation.condensed import LARGEST_FRICTION, cholesky_factor, load_unit, node_units
 from enumsol.condensation.data import exactly_at
-from enumsol.condensation.enclosure import EnclosedSystem, NotEnclosedError, RigidRows, nearest_floats
+from enumsol.condensation.enclosure import EnclosedSystem, NotEnclosedError, RigidRows, coefficients, of_compliance
 from enumsol.errors import InvalidProblemError
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Sequence
+    from collections.abc import Iterator
 
     from enumsol.condensation.data import ProblemData
     from enumsol.condensation.enclosure import CondensedEnclosure
@@ -59,32 +59,28 @@ class FrictionUnits:
         return np.where(self.tau >= 0, values[self.tau], 0.0)
 
     @cached_property
-    def _units(self) -> Floats:
+    def tau_units(self) -> Floats:
         """Units of tau, shape (p, 2), 1 where it does not occur."""
         return np.where(self.tau >= 0, self.unit[self.tau], 1.0)
 
     @cached_property
     def disc_scale(self) -> Floats:
         """By what |tau| <= lambda_n is multiplied so that nothing in it is large, shape (p,)."""
-        return np.asarray(1.0 / np.maximum(np.max(self._units, axis=1), 1.0))
+        return np.asarray(1.0 / np.maximum(np.max(self.tau_units, axis=1), 1.0))
 
     @cached_property
     def slip_scale(self) -> Floats:
         """By what v is multiplied so that its larger component has the size of w_t, shape (p,)."""
-        return np.asarray(np.min(self._units, axis=1))
+        return np.asarray(np.min(self.tau_units, axis=1))
 
     @cached_property
     def tau_scale(self) -> Floats:
-        """By what entries of y are multiplied for ``taus``, shape (p, 2)."""
-        return self._units * self.disc_scale[:, None]
-
-    def taus(self, y: Floats) -> Floats:
-        """tau times ``disc_scale``, shape (p, 2)."""
-        return self.tangential(y) * self.tau_scale
+        """By what entries of y are multiplied to give tau times ``disc_scale``, shape (p, 2)."""
+        return self.tau_units * self.disc_scale[:, None]
 
     def slips(self, w: Floats) -> Floats:
         """v times ``slip_scale``, shape (p, 2)."""
-        return self.tangential(w) * (self.slip_scale[:, None] / self._units)
+        return self.tangential(w) * (self.slip_scale[:, None] / self.tau_units)
 
 
 def friction_units(F: Floats) -> Floats:
@@ -193,25 +189,39 @@ class PieceTurn:
     disc_turn: Ball
 
 
+#: Stands for the discs at one alpha, all of the radius one.
+_ONES = Ball.exact(np.ones(0))
+
+
 @dataclass(frozen=True)
 class EnclosedSpace(EnclosedSystem, FrictionUnits):
-    """A SpaceSystem as balls: S, g and F for the data as given.
+    """A SpaceSystem as balls: S, g and F for the data as given, at one alpha or at all alpha of a piece.
+
+    Over a piece lambda_t is F tau with one F, so that S is the same everywhere and |tau| is at most the radius of a
+    disc times lambda_n. g, h and these radii are affine in alpha; here they are the balls of the whole piece (theory,
+    sections 12.9 and 14.14). In ``turn`` g is bordered by h.
 
     Attributes
     ----------
     tau, unit : arrays
         As in SpaceSystem.
+    discs : Ball of shape (p,)
+        Radii of the discs of tau over lambda_n, by default one; of an AlphaSpace F(alpha) over F.
+    turn : PieceTurn or None
+        Change of g and discs along a piece of alpha; None at one alpha.
     """
 
     tangents = 2
 
     tau: Indices
     unit: Floats
+    discs: Ball = field(kw_only=True, default_factory=lambda: _ONES)
+    turn: PieceTurn | None = field(kw_only=True, default=None)
 
-    @property
-    def discs(self) -> Ball:
-        """Radii of the discs of tau over lambda_n, shape (p,): one, but over a piece of alpha (see PieceSpace)."""
-        return Ball.exact(np.ones(len(self.F)))
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        if self.discs is _ONES:
+            object.__setattr__(self, "discs", Ball.exact(np.ones(len(self.F))))
 
     @cached_property
     def inverse_friction(self) -> Ball:
@@ -219,27 +229,52 @@ class EnclosedSpace(EnclosedSystem, FrictionUnits):
         F = np.where(self.F > 0, self.F, 1.0)
         return Ball(1.0 / F, (2.0 * self.F_rad / F + 2 * UNIT) / F * SAFE)
 
+    def forces_of(self, y: Ball, force: Floats) -> Ball:
+        """Forces (3p,), all normals first, of scaled ones y, with units of force (p,); 0 where there is no friction."""
+        return self._by_node(y, self.balls[2], force, 0.0)
+
+    def displacements_of(self, w: Ball, length: Floats) -> Ball:
+        """Displacements (3p,) of scaled ones w, with units of length (p,); unbounded where there is no friction."""
+        return self._by_node(w, self.inverse_friction, length, np.inf)
+
+    def _by_node(self, scaled: Ball, factors: Ball, unit: Floats, missing: float) -> Ball:
+        """All normal components, then both tangential ones times their factors; zeros stay exact."""
+        p, nodes = self.p, np.arange(self.p)
+        found = Ball(np.zeros(3 * p), np.full(3 * p, missing))
+        for k, at in enumerate([nodes, *self.tau.T]):
+            has = np.flatnonzero(at >= 0)
+            own = scaled[at[has]]
+            part = own * factors[has, k - 1] if k else own
+            rad = np.where((own.mid == 0) & (own.rad == 0), 0.0, part.rad * unit[has] + TINY)
+            found[k * p + has] = Ball(part.mid * unit[has], rad)
+        return found
+
     @property
     def end_discs(self) -> tuple[Ball, ...]:
         """``discs`` at both ends of the piece, between which they are affine in alpha; once where there is no piece."""
-        return (self.discs,)
+        turn = self.turn
+        return (self.discs,) if turn is None else (turn.disc - turn.disc_turn, turn.disc + turn.disc_turn)
 
     @cached_property
     def largest_discs(self) -> Floats:
         """Upper bounds of ``discs``."""
         return np.where(self.discs.rad > 0, self.discs.size, self.discs.mid)
 
-    @property
-    def turn(self) -> PieceTurn | None:
-        """Change of g and discs along a piece of alpha; None at one alpha."""
-        return None
-
     @cached_property
+    def references(self) -> Floats:
+        """F of the first component with friction, (p,), as lambda_t is F tau; 1 where there is none."""
+        found = np.ones(len(self.tau))
+        for k in (1, 0):
+            has = self.tau[:, k] >= 0
+            found[has] = self.F[has, k] / self.unit[self.tau[has, k]]
+        return found
+
+    @of_compliance
     def largest_norm(self) -> float:
         """Upper bound on the norm of every S in the enclosure."""
         return float(upper_norm(self.S) + upper_norm(self.S_rad)) * SAFE
 
-    @cached_property
+    @of_compliance
     def product_error(self) -> Floats:
         """By how much a computed S y, with the terms of a sum that it is part of, may be off, as a factor of |y|."""
         return np.asarray((gamma(len(self.g) + 4) * np.abs(self.S) + self.S_rad) * SAFE)
@@ -260,84 +295,9 @@ class EnclosedSpace(EnclosedSystem, FrictionUnits):
             Something over- or underflows.
         """
         pairs = zip(*(part.T for part in enclosure.problem.affine_friction), strict=True)
-        exact = [exactly_at(alpha, *pair) for pair in pairs]
-        F, inexact = (np.array(part).T for part in zip(*map(nearest_floats, exact), strict=True))
-        return _enclosed(enclosure, alpha, (force, length), _variables(F, np.where(inexact, 2 * UNIT * F, 0.0)))
-
-
-@dataclass(frozen=True)
-class PieceSpace(EnclosedSpace):
-    """All problems over a piece of alpha, or at a point, as balls, in variables that do not depend on alpha.
-
-    lambda_t is F tau with one F for the whole piece, so that S is the same everywhere and |tau| is at most the radius
-    of a disc times lambda_n. g, h and these radii are affine in alpha; here they are the balls of the whole piece
-    (theory, sections 12.9 and 14.14). In ``turn`` g is bordered by h.
-
-    Attributes
-    ----------
-    disc, disc_rad : (p,) arrays
-        See ``discs``.
-    along : PieceTurn or None
-        See ``turn``.
-    fixed : EnclosedSpace
-        With the same S: what follows from that alone is computed once (see AlphaSpace).
-    """
-
-    disc: Floats
-    disc_rad: Floats
-    along: PieceTurn | None
-    fixed: EnclosedSpace
-
-    @property
-    def turn(self) -> PieceTurn | None:
-        """Change of g and discs along the piece; None over a point."""
-        return self.along
-
-    @property
-    def discs(self) -> Ball:
-        """F(alpha) over F for all alpha of the piece, shape (p,)."""
-        return Ball(self.disc, self.disc_rad)
-
-    @property
-    def end_discs(self) -> tuple[Ball, ...]:
-        """``discs`` at both ends."""
-        if self.along is None:
-            return (self.discs,)
-        return self.along.disc - self.along.disc_turn, self.along.disc + self.along.disc_turn
-
-    @cached_property
-    def references(self) -> Floats:
-        """F of the first component with friction, exact, (p,): lambda_t of it is F tau; 1 where there is none."""
-        found = np.ones(len(self.tau))
-        for k in (1, 0):
-            has = self.tau[:, k] >= 0
-            found[has] = self.F[has, k] / self.unit[self.tau[has, k]]
-        return found
-
-    @property
-    def inverse(self) -> Floats:
-        """Approximate inverse of S; no claim rests on its accuracy."""
-        return self.fixed.inverse
-
-    @property
-    def smallest_eigenvalue(self) -> float:
-        """Proven lower bound on the smallest eigenvalue of every S in the enclosure (see EnclosedSystem)."""
-        return self.fixed.smallest_eigenvalue
-
-    @property
-    def form_error(self) -> float:
-        """By how much a computed x'S x may be off, as a factor of |x|^2."""
-        return self.fixed.form_error
-
-    @property
-    def largest_norm(self) -> float:
-        """Upper bound on the norm of every S in the enclosure."""
-        return self.fixed.largest_norm
-
-    @property
-    def product_error(self) -> Floats:
-        """By how much a computed S y may be off, as a factor of |y|."""
-        return self.fixed.product_error
+        axes = [coefficients(exactly_at(alpha, *pair)) for pair in pairs]
+        F, F_rad = (np.stack(part, axis=1) for part in zip(*((F.mid, F.rad) for F in axes), strict=True))
+        return _enclosed(enclosure, alpha, (force, length), _variables(F, F_rad))
 
 
 @dataclass(frozen=True, eq=False)
@@ -373,11 +333,6 @@ class AlphaSpace:
     def _variables(self) -> _Variables:
         return _variables(*self._friction)
 
-    @property
-    def _rows(self) -> tuple[Ball, Indices]:
-        """By what the rows that y takes are multiplied, and where they are among 3p."""
-        return self._variables[:2]
-
     @cached_property
     def fixed(self) -> EnclosedSpace:
         """S, F and the places of tau, which do not depend on alpha, with g at ``reference``."""
@@ -402,9 +357,9 @@ class AlphaSpace:
 
     def discs(self, alpha: Fraction, change: Fraction = Fraction(1)) -> Ball:
         """Coefficients at alpha over F, (p,)."""
-        return _nearest([change * value + alpha * slope for value, slope in self._quotients])
+        return nearest([change * value + alpha * slope for value, slope in self._quotients])
 
-    def at(self, alpha: Fraction) -> PieceSpace:
+    def at(self, alpha: Fraction) -> EnclosedSpace:
         """The data at a point, the last of which are kept."""
         found = self._points.get(alpha)
         if found is None:
@@ -414,10 +369,10 @@ class AlphaSpace:
         return found
 
     @cached_property
-    def _points(self) -> dict[Fraction, PieceSpace]:
+    def _points(self) -> dict[Fraction, EnclosedSpace]:
         return {}
 
-    def over(self, low: Fraction, high: Fraction) -> PieceSpace:
+    def over(self, low: Fraction, high: Fraction) -> EnclosedSpace:
         """Balls for the exact data over a piece, or at a point.
 
         Raises
@@ -430,28 +385,27 @@ class AlphaSpace:
             if min(ends) < 0 or (not any(by) and max(ends) > 0):
                 raise NotEnclosedError("a coefficient of friction is negative, or begins to be positive, over a piece")
         middle, half = (low + high) / 2, (high - low) / 2
-        (weight, rows), length, held = self._rows, np.tile(self.units[1], 3), self.fixed
+        (weight, rows), length, held = self._variables[:2], np.tile(self.units[1], 3), self.fixed
         g, g_rad = self.enclosure.load_in_units(middle, length)
-        disc, disc_turn = self.discs(middle), self.discs(half, Fraction(0))
+        disc, disc_turn, step = self.discs(middle), self.discs(half, Fraction(0)), nearest([half])[0]
         with np.errstate(over="ignore", invalid="ignore"):
             whole = load = weight * Ball(g, g_rad)[rows]
             along = None
             if half:
                 turn = Ball(self.enclosure.g1 / length, self.enclosure.g1_rad / length * SAFE + TINY)[rows]
-                turn = weight * (turn * Ball(np.array(float(half)), np.array(2 * UNIT * float(half))))
+                turn = weight * (turn * step)
                 whole = Ball(load.mid, (load.rad + turn.size) * SAFE)
                 along = PieceTurn(load, turn, disc, disc_turn)
         if not whole.finite:
             raise NotEnclosedError(_OVERFLOW)
-        rad = (disc.rad + disc_turn.size) * SAFE
-        data = held.S, held.S_rad, whole.mid, whole.rad, held.F, held.F_rad, held.tau, held.unit, disc.mid, rad
         rigid = self._rigid(middle)
         if along is not None:
-            turn = rigid.slope * Ball(np.array(float(half)), np.array(2 * UNIT * float(half)))
+            turn = rigid.slope * step
             turn = Ball(turn.mid, np.where(rigid.slope.size > 0, turn.rad, 0.0))
             along = replace(along, g=Ball.joined(along.g, rigid.h), g_turn=Ball.joined(along.g_turn, turn))
             rigid = replace(rigid, h=Ball(rigid.h.mid, (rigid.h.rad + turn.size) * SAFE))
-        return PieceSpace(*data, along, held, rows=rigid)
+        discs = Ball(disc.mid, (disc.rad + disc_turn.size) * SAFE)
+        return replace(held, g=whole.mid, g_rad=whole.rad, rows=rigid, discs=discs, turn=along, fixed=held)
 
     @cached_property
     def moved(self) -> Ball:
@@ -464,7 +418,7 @@ class AlphaSpace:
         """Equilibrium of the body as a whole at alpha, on (lambda_n, tau)."""
         force, length = self.units
         rows = RigidRows.of(self.enclosure.problem, alpha, np.tile(force, 3), np.tile(length, 3))
-        weight, own = self._rows
+        weight, own, _ = self._variables
         return _on_tau(rows, own, weight)
 
 
@@ -500,13 +454,6 @@ def _enclosed(
     S_rad = np.maximum(scaled.rad, scaled.rad.T) + np.abs(scaled.mid - scaled.mid.T)
     S = np.tril(scaled.mid) + np.tril(scaled.mid, -1).T
     return EnclosedSpace(S, S_rad * SAFE, load.mid, load.rad, *of_friction, rows=own)
-
-
-def _nearest(exact: Sequence[Fraction]) -> Ball:
-    """Balls around the floats next to numbers."""
-    mid = np.array([float(number) for number in exact])
-    same = np.array([Fraction(near) == number for near, number in zip(mid.tolist(), exact, strict=True)], dtype=bool)
-    return Ball(mid, np.where(same, 0.0, UNIT * np.abs(mid) * SAFE + TINY))
 
 
 def node_friction(
@@ -549,9 +496,8 @@ def _references(problem: ProblemData, alpha: Fraction) -> tuple[Floats, Floats]:
         reference, k = (Fraction(float(at[0])), 0) if at[0] else (Fraction(float(at[1])), 1)
         found[0, i, k] = float(reference)
         if k == 0 and at[1]:
-            exact = reference * ratio
-            found[0, i, 1] = float(exact)
-            found[1, i, 1] = 0.0 if Fraction(float(exact)) == exact else 2 * UNIT * float(exact)
+            other = nearest([reference * ratio])
+            found[0, i, 1], found[1, i, 1] = other.mid[0], other.rad[0]
     return found[0], found[1]
 
 

@@ -1,10 +1,9 @@
 """Piecewise smooth Newton and Moore-Penrose continuation (paper, Algorithm 5.1) and the local branch test."""
 
 from enumsol.continuation.newton import NewtonIteration, NotConverged, newton
-from enumsol.continuation.parameter_path import SmoothPath
 from enumsol.continuation.path import AmbiguousStart, Path, follow, start_tangents
-from enumsol.continuation.path_data import ContinuationOptions, PathPoint, PathStats, Transition
-from enumsol.continuation.tangents import Tangent
+from enumsol.continuation.path_data import ContinuationOptions, PathPoint, PathStats, Tangent, Transition
+from enumsol.continuation.scaled_equation import SmoothPath
 from enumsol.roots.local_branch import LocalBranchTest, local_branch_test
 
 __all__ = [

@@ -5,7 +5,6 @@ H is the residual of a contact problem; with it come its test functions and sele
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 from types import MappingProxyType
 
@@ -25,10 +24,8 @@ from enumsol.model.statuses import (
     SLIP_MINUS,
     SLIP_PLUS,
     STICK,
-    ContactStatus,
     RowKind,
     active_within,
-    contact_status,
 )
 from enumsol.support.arguments import instance_of, positive_number
 from enumsol.support.array_arguments import plain_array, real_array
@@ -100,34 +97,25 @@ class PiecewiseSmoothEquation:
         return np.sign(self.test_functions(x, alpha)).astype(np.int8)
 
     def residual(self, x: ArrayLike, alpha: AlphaLike) -> Floats:
-        """H(x, alpha), shape (n + 2p,), evaluated from the projections themselves."""
-        u, lambda_n, lambda_t = self.split(x)
-        problem, r = self.problem, self.r
-        bound = problem.friction_at(alpha) * lambda_n
-        trial = lambda_t + r * (problem.Bt @ u - problem.slip_offset)
+        """H(x, alpha), shape (n + 2p,)."""
         # P by its pieces: the sum min + max - trial would lose the bound's digits where r u_t is much larger
-        inside = np.clip(trial, -np.abs(bound), np.abs(bound))
-        projected = np.where(bound >= 0, inside, -inside)
-        return np.concatenate(
-            [
-                self._equilibrium(u, lambda_n, lambda_t, alpha),
-                lambda_n - np.maximum(0.0, lambda_n + r * (problem.Bn @ u - problem.gap)),
-                lambda_t - projected,
-            ]
-        )
+        return self._selected(self.test_functions(x, alpha) > 0, x, alpha)
 
     def selection_residual(self, signs: ArrayLike, x: ArrayLike, alpha: AlphaLike) -> Floats:
         """The selection function of H that ``signs`` (p, 3) names, at x; equals H where the test functions agree."""
+        return self._selected(self._rows(signs), x, alpha)
+
+    def _selected(self, rows: Mask, x: ArrayLike, alpha: AlphaLike) -> Floats:
         u, lambda_n, lambda_t = self.split(x)
         problem, r = self.problem, self.r
-        closed, slips, count = pieces(self._rows(signs))
+        closed, slips, count = pieces(rows)
         bound = problem.friction_at(alpha) * lambda_n
         u_n, u_t = problem.Bn @ u - problem.gap, problem.Bt @ u - problem.slip_offset
         return np.concatenate(
             [
-                self._equilibrium(u, lambda_n, lambda_t, alpha),
+                problem.A @ u + problem.Bn.T @ lambda_n + problem.Bt.T @ lambda_t - problem.load_at(alpha),
                 np.where(closed, -r * u_n, lambda_n),
-                lambda_t - slips * bound - count * (lambda_t + r * u_t),
+                (1 - count) * lambda_t - slips * bound - count * r * u_t,
             ]
         )
 
@@ -156,12 +144,6 @@ class PiecewiseSmoothEquation:
                 f"signs has shape {array.shape}; expected (p, 3) = ({self.problem.p}, 3) with entries -1 or 1"
             )
         return np.asarray(array > 0)
-
-    def _equilibrium(self, u: Floats, lambda_n: Floats, lambda_t: Floats, alpha: AlphaLike) -> Floats:
-        problem = self.problem
-        return np.asarray(
-            problem.A @ u + problem.Bn.T @ lambda_n + problem.Bt.T @ lambda_t - problem.load_at(alpha), dtype=np.float64
-        )
 
 
 def pieces(rows: Mask) -> tuple[Mask, Floats, Floats]:
@@ -279,9 +261,6 @@ class CondensedEquation(ScaledEquation):
         rows[_CONES] /= 1.0 + values.F[:, None]
         return self._of_inequalities(codes, rows, 0.0)
 
-    def _touching(self, i: int, x: Floats) -> int:
-        return SLIP_PLUS if self.w(x)[self.p + i] > 0 else SLIP_MINUS
-
     def active(self, x: Floats, tolerance: float = STATUS_TOLERANCE) -> tuple[frozenset[int], ...]:
         """Per node the status codes whose equations and conditions hold within the tolerance."""
         return active_within(self._row_values(x), ~self.frictionless, tolerance)
@@ -291,13 +270,6 @@ class CondensedEquation(ScaledEquation):
         slips = np.where(upper + lower > 0, SLIP_PLUS, SLIP_MINUS)
         rubs = np.where((upper < 0) & (lower > 0), STICK, slips)
         return tuple(np.where(normal <= 0, OPEN, np.where(self.frictionless, FRICTIONLESS, rubs)).tolist())
-
-    def statuses(self, codes: Sequence[int], slip: Floats) -> tuple[ContactStatus, ...]:
-        """Names of the statuses; a frictionless node in contact is named by the sign of its u_t."""
-        return tuple(contact_status(code, float(u)) for code, u in zip(codes, slip, strict=True))
-
-
-_NAMES = {OPEN: ContactStatus.OPEN, STICK: ContactStatus.STICK, SLIP: ContactStatus.SLIP}
 
 
 @dataclass(frozen=True)
@@ -451,9 +423,6 @@ class DiscEquation(ScaledEquation):
         found[:, 1] = np.where((named == SLIP)[:, None], along, 0.0)
         return found
 
-    def _touching(self, i: int, x: Floats) -> int:
-        return SLIP
-
     def active(self, x: Floats, tolerance: float = STATUS_TOLERANCE) -> tuple[frozenset[int], ...]:
         """Per node the status codes whose equations and conditions hold within the tolerance."""
         found: list[set[int]] = [set() for _ in range(self.p)]
@@ -475,12 +444,6 @@ class DiscEquation(ScaledEquation):
         slips = self._trial(x, ones, cone).length >= cone.c * np.maximum(normal, 0.0)
         touching = np.where(self.frictionless, FRICTIONLESS, np.where(slips, SLIP, STICK))
         return tuple(np.where(normal > 0, touching, OPEN).tolist())
-
-    def statuses(self, codes: Sequence[int], slip: Floats) -> tuple[ContactStatus, ...]:
-        """Names of the statuses; a frictionless node in contact slips wherever its u_t is not 0."""
-        moves = np.any(np.reshape(slip, (2, -1)) != 0, axis=0)
-        without = (ContactStatus.STICK, ContactStatus.SLIP)
-        return tuple(_NAMES.get(code, without[bool(move)]) for code, move in zip(codes, moves, strict=True))
 
 
 def _flat(normal: Floats, tangential: Floats) -> Floats:

@@ -8,19 +8,21 @@ from typing import TYPE_CHECKING, Generic, TypeVar
 
 import numpy as np
 
-from enumsol.continuation.path_data import PathData, PathStatus, PointKind
+from enumsol.continuation.path_data import PathData, PathStatus, PointKind, Tangent
 from enumsol.continuation.recorder import SAME_POINT, Landmarks, PathRecorder, points_of
 from enumsol.continuation.scaled_equation import STATUS_TOLERANCE
-from enumsol.continuation.tangents import RATE_TOLERANCE, Tangent, curve_tangent, orientation
 from enumsol.continuation.transitions import (
     FORWARD_TOLERANCE,
+    RATE_TOLERANCE,
     Correction,
     Kink,
     TangentPoint,
     confirm,
     continuations,
+    curve_tangent,
     moore_penrose,
     next_kink,
+    orientation,
     passed_kink,
     same_curve,
     smooth_newton,
@@ -34,7 +36,7 @@ from enumsol.support.messages import counted
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from enumsol.continuation.start import Start
+    from enumsol.continuation.newton import Start
     from enumsol.support.array_types import Floats
     from enumsol.support.deadlines import Ending
 
@@ -45,10 +47,10 @@ _Stop = tuple[PathStatus, str]
 
 @dataclass(frozen=True)
 class _Step:
-    """An accepted step: its end, the transition points passed on the way, and how it was found."""
+    """An accepted step: its end, the transition point passed on the way, if there was one, and how it was found."""
 
     end: TangentPoint
-    kinks: tuple[Kink, ...]
+    kink: Kink | None
     length: float
     corrections: int
 
@@ -217,9 +219,9 @@ class Follower(Generic[_Path]):
         if end.codes == self.current.codes:
             if not same_curve(self.equation, self.current, end, sharp=h <= self.options.h_min):
                 return None
-            return _Step(end, (), h, correction.count)
+            return _Step(end, None, h, correction.count)
         kink = confirm(self.equation, self.current, end, self.sign, self.options.transition_tolerance)
-        return None if kink is None else _Step(end, (kink,), h, correction.count)
+        return None if kink is None else _Step(end, kink, h, correction.count)
 
     def _end_point(self, correction: Correction) -> TangentPoint | None:
         """The solution beside a corrected point, converged to rounding; None when it is not admissible.
@@ -248,14 +250,13 @@ class Follower(Generic[_Path]):
         if tangent is None:
             return None
         end = TangentPoint(correction.x, codes, tangent)
-        kinks: tuple[Kink, ...] = ()
+        kink = None
         if end.codes != self.current.codes:
             kink = confirm(self.equation, self.current, end, self.sign, self.options.transition_tolerance)
-            kinks = () if kink is None else (kink,)
         if self.equation.dot(end.tangent, correction.tangent) < 0:
             end = TangentPoint(end.x, end.codes, -end.tangent)
             self.sign = orientation(self.equation, end.codes, end.x, end.tangent)
-        return _Step(end, kinks, h, correction.count)
+        return _Step(end, kink, h, correction.count)
 
     def _change_selection(self) -> _Stop | None:
         """Step 8: go to the next transition point of the current curve and leave it on another selection."""
@@ -307,11 +308,11 @@ class Follower(Generic[_Path]):
 
     def _take(self, step: _Step) -> _Stop | None:
         origin = self.current
-        for kink in step.kinks:
-            stop = self._enter(origin, kink)
+        if step.kink is not None:
+            stop = self._enter(origin, step.kink)
             if stop is not None:
                 return stop
-            origin = kink.after
+            origin = step.kink.after
         stop = self._piece(origin, step.end)
         if stop is not None:
             return stop

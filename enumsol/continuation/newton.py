@@ -1,7 +1,8 @@
-"""Piecewise smooth Newton method for H at fixed alpha."""
+"""Piecewise smooth Newton method for H at fixed alpha, and starts of Newton's method and of paths."""
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
@@ -9,23 +10,166 @@ import numpy as np
 
 from enumsol.condensation.condensed import condensation_of, solved
 from enumsol.continuation.condensed_equation import CondensedEquation, DiscEquation
-from enumsol.continuation.start import check_problem, equation_on
+from enumsol.continuation.path_data import ContinuationOptions, PathData
+from enumsol.continuation.scaled_equation import ParameterPath, SmoothPath
 from enumsol.errors import EnumsolError, InvalidArgumentError
+from enumsol.model.problem import ContactProblem, check_is_problem
 from enumsol.model.statuses import OPEN, SLIP, STICK
 from enumsol.roots.local_branch import SINGULAR_TOLERANCE, SelectionTangent
 from enumsol.roots.root import Root
-from enumsol.support.arguments import alpha_value, positive_integer, positive_number
+from enumsol.support.arguments import alpha_value, instance_of, positive_integer, positive_number, unbounded_interval
 from enumsol.support.array_arguments import real_array
 from enumsol.support.messages import counted
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from enumsol.continuation.parameter_path import SmoothPath
     from enumsol.continuation.scaled_equation import ScaledEquation
-    from enumsol.model.problem import ContactProblem
     from enumsol.model.problem3d import AnyProblem
     from enumsol.support.array_types import Alpha, AlphaLike, ArrayLike, Codes, Floats
+
+
+def check_problem(problem: object, smooth_path: SmoothPath | None) -> None:
+    """Refuse what continuation does not take.
+
+    Raises
+    ------
+    InvalidArgumentError
+        The problem is none, or the smooth path is none.
+    """
+    check_is_problem(problem)
+    if smooth_path is not None:
+        instance_of(smooth_path, SmoothPath, "smooth_path")
+
+
+def equation_on(
+    problem: AnyProblem,
+    smooth_path: SmoothPath | None,
+    start: float,
+    interval: tuple[float, float] = (-math.inf, math.inf),
+    r: float | None = None,
+    alpha_scale: float = 1.0,
+) -> ScaledEquation:
+    """The equation of a problem, on its own affine path or a smooth one; for the arguments see ScaledEquation."""
+    kind = CondensedEquation if isinstance(problem, ContactProblem) else DiscEquation
+    return kind(ParameterPath(problem, smooth_path, start), interval, start, r, alpha_scale)
+
+
+#: The default alpha scale is this fraction of the interval.
+ALPHA_FRACTION = 0.05
+#: A change of the problem over the whole interval that is too small to follow: conditions within STATUS_TOLERANCE of
+#: zero count as met with equality, and must not all be within it.
+RESOLUTION = 1e-6
+#: Norm of H above which a start is not a root.
+START_TOLERANCE = 1e-6
+#: What a start is made of, and of a body that nothing holds this as well.
+_NAMES, _RIGID = ("alpha", "lambda_n", "lambda_t"), "rigid_coordinates"
+
+
+class Start:
+    """Validated arguments: the equation, the start as a point of it, interval, options and smooth path."""
+
+    def __init__(
+        self,
+        problem: AnyProblem,
+        start: object,
+        interval: tuple[AlphaLike, AlphaLike] | None,
+        options: ContinuationOptions | None,
+        smooth_path: SmoothPath | None,
+    ) -> None:
+        check_problem(problem, smooth_path)
+        chosen = ContinuationOptions() if options is None else options
+        self.options = instance_of(chosen, ContinuationOptions, "options")
+        self.smooth_path = smooth_path
+        plane = isinstance(problem, ContactProblem)
+        modes = problem.modes.r
+        alpha, forces, rigid = _start_values(start, (problem.p,) if plane else (problem.p, 2), modes)
+        self.interval = _interval(problem, interval, alpha, smooth_path)
+        low, high = self.interval
+        scale = self.options.alpha_scale
+        if scale is None:
+            scale = ALPHA_FRACTION * (high - low) if math.isfinite(high - low) else 1.0
+        self.equation = equation_on(problem, smooth_path, alpha, self.interval, self.options.r, scale)
+        if smooth_path is None and math.isfinite(high - low):
+            self._check_resolution(alpha, (high - low) / scale)
+        self.x = self._on_solution(alpha, forces, rigid)
+
+    def _check_resolution(self, alpha: float, width: float) -> None:
+        """Refuse an interval over which the problem hardly changes."""
+        equation = self.equation
+        values = equation.at(equation.point(alpha, np.zeros(equation.m)))
+        change = max(np.max(np.abs(values.dg)), np.max(np.abs(values.dF) / (1.0 + values.F))) * width
+        if 0 < change < RESOLUTION:
+            raise InvalidArgumentError(
+                f"interval is ({self.interval[0]:.17g}, {self.interval[1]:.17g}), over which friction and load change "
+                f"by {change:.1e} of their size; expected at least {RESOLUTION:g} (branch_graph works without rounding)"
+            )
+
+    def _on_solution(self, alpha: float, forces: Floats, rigid: Floats) -> Floats:
+        equation = self.equation
+        x = equation.point(alpha, forces, rigid)
+        if np.any(np.abs(rigid) > equation.reach):
+            mode = int(np.argmax(np.abs(rigid) / equation.reach))
+            raise InvalidArgumentError(
+                f"start has {rigid[mode]:g} as coordinate of rigid mode {mode}; expected at most "
+                f"{equation.reach[mode]:g} (see max_rigid_displacement)"
+            )
+        with np.errstate(over="ignore", invalid="ignore"):
+            residual = float(np.linalg.norm(equation.residual(x)))
+        if not residual <= START_TOLERANCE:
+            raise InvalidArgumentError(
+                f"start is not a root at alpha = {alpha:g}: the residual of H is {residual:.2e} relative to the load; "
+                f"expected at most {START_TOLERANCE:g} (newton(problem, alpha, start) finds the root nearby)"
+            )
+        return x
+
+
+def _start_values(start: object, tangential: tuple[int, ...], modes: int) -> tuple[float, Floats, Floats]:
+    """alpha, the forces (m,) and rigid coordinates (modes,) of a start whose lambda_t has that shape."""
+    values = (*_NAMES, *((_RIGID,) if modes else ()))
+    if isinstance(start, tuple) and len(start) == len(values):
+        alpha, *given = start
+    elif all(getattr(start, name, None) is not None for name in values) and not isinstance(start, PathData):
+        alpha, *given = (getattr(start, name) for name in values)
+    else:
+        found = f"a tuple of {len(start)}" if isinstance(start, tuple) else f"a {type(start).__name__}"
+        raise InvalidArgumentError(f"start is {found}; expected a Root, a PathPoint or ({', '.join(values)})")
+    parts = []
+    for name, part, shape in zip(values[1:], given, (tangential[:1], tangential, (modes,)), strict=False):
+        parts.append(np.atleast_1d(real_array(part, f"{name} of start", error=InvalidArgumentError)))
+        if parts[-1].shape != shape:
+            raise InvalidArgumentError(f"{name} of start has shape {parts[-1].shape}; expected {shape}")
+    forces = np.concatenate([part.ravel(order="F") for part in parts[:2]])
+    return float(alpha_value(alpha, "alpha of start")), forces, parts[2] if modes else np.zeros(0)
+
+
+def _interval(
+    problem: AnyProblem, interval: tuple[AlphaLike, AlphaLike] | None, start: float, smooth_path: SmoothPath | None
+) -> tuple[float, float]:
+    affine = smooth_path is None or smooth_path.F is None
+    if interval is None:
+        return friction_domain(problem) if affine else (-math.inf, math.inf)
+    low, high = unbounded_interval(interval)
+    if not low <= start <= high:
+        raise InvalidArgumentError(f"start has alpha = {start:g}, outside the interval ({low:g}, {high:g})")
+    if affine:
+        for end in (low, high):
+            if math.isfinite(end):
+                problem.friction_at(end)
+        domain = friction_domain(problem)
+        low, high = max(low, domain[0]), min(high, domain[1])
+    return low, high
+
+
+def friction_domain(problem: AnyProblem) -> tuple[float, float]:
+    """The range of alpha in which no coefficient F0 + alpha F1 is negative."""
+    F0, F1 = problem.affine_friction
+    with np.errstate(divide="ignore", invalid="ignore"):
+        zero = -F0 / F1
+    low = np.max(zero[F1 > 0], initial=-math.inf)
+    high = np.min(zero[F1 < 0], initial=math.inf)
+    return float(low), float(high)
+
 
 #: Shortest fraction of a Newton step that the line search tries.
 MIN_FRACTION = 2.0**-12
@@ -141,7 +285,7 @@ def newton(
         frozen = smooth_path.problem_at(frozen, value)
     frozen.friction_at(exact)
     equation = equation_on(problem, smooth_path, value, r=r)
-    forces, rigid = _start_values(start, problem.p, equation.m // problem.p, equation.modes)
+    forces, rigid = _unknowns_of(start, problem.p, equation.m // problem.p, equation.modes)
     x = equation.point(value, forces, rigid)
     x = _iterate(equation, x, value, max_iterations)
     if equation.modes or isinstance(equation, DiscEquation):
@@ -150,7 +294,7 @@ def newton(
     return build_root(frozen, exact if smooth_path is None else value, equation, x)
 
 
-def _start_values(start: Root | ArrayLike | None, p: int, d: int, modes: int) -> tuple[Floats, Floats]:
+def _unknowns_of(start: Root | ArrayLike | None, p: int, d: int, modes: int) -> tuple[Floats, Floats]:
     """Forces in d components at every node, (d p,), and the coordinates of the rigid displacement, (modes,)."""
     none = np.zeros(modes)
     if start is None:
@@ -216,8 +360,7 @@ def _fraction(equation: ScaledEquation, x: Floats, step: Floats) -> float:
 def build_root(problem: ContactProblem, alpha: Alpha, equation: CondensedEquation, x: Floats) -> Root:
     """The Root at a point x of the condensed equation, with its index, margin and derivative."""
     # the enumeration is not needed to follow paths, and slow to import
-    from enumsol.roots.builder import RootBuilder
-    from enumsol.roots.components import connected_components
+    from enumsol.roots.components import RootBuilder, connected_components
     from enumsol.selections.float_selections import FloatSelections
 
     floats = FloatSelections(problem.condensed.at(alpha).scaled)

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any, Protocol
 import numpy as np
 
 from enumsol.continuation.follower import Follower
+from enumsol.continuation.newton import Start
 from enumsol.continuation.path_data import (
     ARRAYS,
     RIGID,
@@ -16,11 +17,10 @@ from enumsol.continuation.path_data import (
     PathStats,
     PathStatus,
     PointKind,
+    Tangent,
     Transition,
 )
-from enumsol.continuation.start import Start
-from enumsol.continuation.tangents import Tangent, admissible_tangents, curve_tangent
-from enumsol.continuation.transitions import ACTIVE_TOLERANCE, TangentPoint
+from enumsol.continuation.transitions import ACTIVE_TOLERANCE, TangentPoint, admissible_tangents, curve_tangent
 from enumsol.errors import InvalidArgumentError
 from enumsol.model.statuses import ContactStatus
 from enumsol.roots.local_branch import LocalBranchTest
@@ -33,7 +33,7 @@ if TYPE_CHECKING:
     import os
     from collections.abc import Callable, Sequence
 
-    from enumsol.continuation.parameter_path import SmoothPath
+    from enumsol.continuation.scaled_equation import SmoothPath
     from enumsol.model.problem3d import AnyProblem
     from enumsol.support.array_types import AlphaLike
 
@@ -55,10 +55,10 @@ def save_path(followed: PathData, path: str | os.PathLike[str]) -> None:
         "next_step": followed.next_step,
         "stats": followed.stats.__dict__,
         "node_ids": followed.node_ids,
-        "names": [[status.value for status in point.statuses] for point in followed],
+        "names": followed._names,
     }
     if followed.rigid_coordinates is not None:
-        report[RIGID] = followed.rigid_coordinates.tolist()
+        report[RIGID] = followed.rigid_coordinates
     write_arrays(file_path(path, "path"), _FORMAT, report, {name: getattr(followed, name) for name in ARRAYS})
 
 
@@ -107,15 +107,12 @@ def _unpacked(report: dict[str, Any], arrays: dict[str, Any]) -> Path:
 
 def _pack(item: Transition) -> dict[str, Any]:
     test = item.local_test
-    packed = None
-    if test is not None:
-        signs = [[[s.value for s in statuses], sign] for statuses, sign in test.signs]
-        packed = {"exists": test.exists, "premise": test.premise, "signs": signs}
+    packed = None if test is None else {"exists": test.exists, "premise": test.premise, "signs": test.signs}
     return {
         "point": item.point,
         "alpha": item.alpha,
-        "before": [s.value for s in item.before],
-        "after": [s.value for s in item.after],
+        "before": item.before,
+        "after": item.after,
         "nodes": item.nodes,
         "dalpha": [item.dalpha_before, item.dalpha_after],
         "local_test": packed,
@@ -132,10 +129,6 @@ def _unpack(data: dict[str, Any]) -> Transition:
     return Transition(
         data["point"], data["alpha"], before, after, tuple(data["nodes"]), float(left), float(right), test
     )
-
-
-#: What a figure of a path may show.
-_QUANTITIES = ("lambda_n", "lambda_t", "u_n", "u_t")
 
 
 class Drawn(Protocol):
@@ -188,7 +181,7 @@ def draw_path(
     InvalidArgumentError
         An argument is not one of those above.
     """
-    one_of(quantity, "quantity", _QUANTITIES)
+    one_of(quantity, "quantity", ("lambda_n", "lambda_t", "u_n", "u_t"))
     node, named_units = row_number(node, "node", path.lambda_n.shape[1]), checked_units(units)
     if graph is not None and ax is not None:
         raise InvalidArgumentError("graph and ax are both given; draw further paths with path.plot(ax=...) alone")

@@ -21,12 +21,42 @@ if TYPE_CHECKING:
 
     import pandas as pd
 
-    from enumsol.continuation.parameter_path import SmoothPath
-    from enumsol.continuation.tangents import Tangent
+    from enumsol.continuation.scaled_equation import SmoothPath
     from enumsol.model.problem3d import AnyProblem
     from enumsol.model.statuses import ContactStatus
     from enumsol.roots.local_branch import LocalBranchTest
-    from enumsol.support.array_types import Floats, Integers, NDArray
+    from enumsol.support.array_types import Codes, Floats, Integers, NDArray
+
+
+@dataclass(frozen=True)
+class Tangent(Sealed):
+    """A direction in which a solution curve leaves a point.
+
+    Attributes
+    ----------
+    statuses : tuple of p ContactStatus
+        Statuses on the curve.
+    dalpha : float
+        Derivative of alpha with respect to the arclength; 0 on a vertical segment.
+    dlambda : (p, 2) array, in 3D (p, 3)
+        Derivatives of (lambda_n, lambda_t) [force].
+    orientation : int
+        +1 positively oriented (theory, (8.2)), -1 negatively, 0 undecided.
+    codes, vector :
+        The same in the variables of the continuation.
+    """
+
+    statuses: tuple[ContactStatus, ...]
+    dalpha: float
+    dlambda: Floats
+    orientation: int
+    codes: Codes
+    vector: Floats
+
+    def __repr__(self) -> str:
+        names = ", ".join(status.value for status in self.statuses[:8])
+        names += ", ..." if len(self.statuses) > 8 else ""
+        return f"Tangent(dalpha={self.dalpha:+.3g}, orientation={self.orientation:+d}, [{names}])"
 
 
 @dataclass(frozen=True, kw_only=True)

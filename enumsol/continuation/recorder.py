@@ -11,8 +11,14 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from enumsol.continuation.path_data import RIGID, PathStats, PathStatus, PointKind, Transition
-from enumsol.continuation.tangents import curve_tangent
-from enumsol.continuation.transitions import FORWARD_TOLERANCE, Kink, TangentPoint, same_curve, smooth_newton
+from enumsol.continuation.transitions import (
+    FORWARD_TOLERANCE,
+    Kink,
+    TangentPoint,
+    curve_tangent,
+    same_curve,
+    smooth_newton,
+)
 from enumsol.errors import TooLargeError
 
 if TYPE_CHECKING:

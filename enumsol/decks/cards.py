@@ -8,10 +8,10 @@ from __future__ import annotations
 
 import re
 from bisect import bisect_right
-from collections.abc import Iterator, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 
@@ -20,6 +20,8 @@ from enumsol.support.array_types import Floats, Integers, NDArray
 from enumsol.support.deadlines import look, tell
 from enumsol.support.files import unreadable
 from enumsol.support.messages import counted, shortened, visible
+
+T = TypeVar("T")
 
 #: Bytes of all files of a deck together: larger ones need several times as much memory when they are read.
 MOST_BYTES = 1_000_000_000
@@ -43,6 +45,22 @@ class DeckPlace:
 
     def __str__(self) -> str:
         return f"{self.file} line {self.line}"
+
+    def refused(self, found: str) -> InvalidArgumentError:
+        """Error about what stands here."""
+        return InvalidArgumentError(f"{self}: {found}")
+
+    def entry(self, table: Mapping[str, T], name: str, said: str, expected: str = "one of") -> T:
+        """The entry of the table that is named here.
+
+        Raises
+        ------
+        InvalidArgumentError
+            There is none; the message begins with what is said, and has the names that there are.
+        """
+        if name not in table:
+            raise self.refused(f"{said}; expected {expected} {', '.join(table) or 'none'}")
+        return table[name]
 
 
 @dataclass(eq=False)
@@ -75,7 +93,7 @@ class Card:
 
     def refused(self, found: str, row: int | None = None) -> InvalidArgumentError:
         """Error about the card, or about a row of its data: its place, its name and what is wrong with it."""
-        return InvalidArgumentError(f"{self.place if row is None else self.at(row)}: *{self.name} {found}")
+        return (self.place if row is None else self.at(row)).refused(f"*{self.name} {found}")
 
     def name_of(self, option: str) -> str:
         """Key of what an option names, "" if there is none (see `key`)."""
@@ -92,6 +110,30 @@ class Card:
         if not (named := self.name_of(option)):
             raise self.refused(f"has no {option}; expected {option}=NAME")
         return named
+
+    def new_name(self, table: Collection[str]) -> str:
+        """Key of the name of something that no other one in a table has.
+
+        Raises
+        ------
+        InvalidArgumentError
+            There is no name, or it is in the table.
+        """
+        if (name := self.needed("NAME")) in table:
+            raise self.refused(f"is named {name} like another one; expected names that differ")
+        return name
+
+    def choice(self, option: str, known: Collection[str], expected: str) -> str:
+        """Key of what an option names, one of those that are known.
+
+        Raises
+        ------
+        InvalidArgumentError
+            It is another one.
+        """
+        if (chosen := self.name_of(option)) not in known:
+            raise self.refused(f"has {option}={chosen}; expected {expected}")
+        return chosen
 
     def entries(self, row: int) -> list[str]:
         """Entries of a line of data, without blanks around them and without empty ones at the end."""
@@ -131,6 +173,20 @@ class Card:
         if _INTEGER.match(entry) and len(entry) <= 18:
             return int(entry)
         raise self.refused(f"has {shown(entry)}; expected an integer", row)
+
+    def components(self, row: int, entries: Sequence[str]) -> tuple[int, ...]:
+        """Components from one to another, or one of them.
+
+        Raises
+        ------
+        InvalidArgumentError
+            They are not among 1 to 6.
+        """
+        ends = [self.integer(entry, row) for entry in entries if entry]
+        if not ends or not 1 <= ends[0] <= ends[-1] <= 6:
+            given = ", ".join(map(str, ends)) or "none"
+            raise self.refused(f"has the components {given}; expected some from 1 to 6", row)
+        return tuple(range(ends[0], ends[-1] + 1))
 
     def numbers(self, row: int, least: int = 0, most: int | None = None) -> list[float]:
         """Numbers in a line of data.
@@ -205,6 +261,12 @@ def _numbers_of(lines: Sequence[str], kind: type[float] | type[int]) -> NDArray[
     return values if np.all(np.isfinite(values)) else None
 
 
+def continued(entries: Sequence[str], each: int) -> list[str]:
+    """Lines of data with so many entries each, all but the last continued."""
+    rows = [", ".join(entries[k : k + each]) for k in range(0, len(entries), each)]
+    return [*(f"{row}," for row in rows[:-1]), *rows[-1:]]
+
+
 def key(name: str) -> str:
     """Name as names are compared: in upper case, but as it stands if it is in quotes."""
     name = name.strip()
@@ -214,6 +276,11 @@ def key(name: str) -> str:
 def shown(entry: str) -> str:
     """An entry of a deck as messages quote it."""
     return repr(visible(shortened(entry, 60)))
+
+
+def target_of(entry: str) -> str:
+    """A number of a node or an element as it stands, or the key of the name of a set."""
+    return entry if is_number(entry) else key(entry)
 
 
 def is_number(entry: str) -> bool:
@@ -302,9 +369,9 @@ class _Source:
             return
         if not self.cards:
             place = DeckPlace(path.name, begin + filled[0] + 1)
-            raise InvalidArgumentError(
-                f"{place}: {shown(stripped[filled[0]])} is no keyword; expected a "
-                "deck of CalculiX or Abaqus, which begins with one, such as *NODE"
+            raise place.refused(
+                f"{shown(stripped[filled[0]])} is no keyword; expected a deck of CalculiX or Abaqus, which begins with "
+                "one, such as *NODE"
             )
         card, last = self.cards[-1], -2
         for count, k in enumerate(filled):

@@ -9,7 +9,6 @@ import numpy as np
 from enumsol.decks.cards import DeckPlace
 from enumsol.decks.elements import EDGES, Shape, shape_of
 from enumsol.decks.model import Deck, by_block
-from enumsol.errors import InvalidArgumentError
 from enumsol.support.array_types import Integers
 
 _NO_FACES = np.zeros((0, 2), dtype=np.int64)
@@ -46,9 +45,9 @@ def named_faces(deck: Deck, elements: Integers, label: str, place: DeckPlace) ->
             number = int(label[1:]) - 1
         else:
             expected = f"S1 to S{len(faces)}" if faces else "SPOS or SNEG"
-            raise InvalidArgumentError(
-                f"{place}: *SURFACE names the face {label or 'of no name'} of elements of type {block.type.name}; "
-                f"expected {expected}"
+            raise place.refused(
+                f"*SURFACE names the face {label or 'of no name'} of elements of type {block.type.name}; expected "
+                f"{expected}"
             )
         found.append(np.column_stack([first + own, np.full(len(own), number)]))
     return np.concatenate(found)
@@ -60,10 +59,7 @@ def face_nodes(deck: Deck, faces: Integers) -> list[tuple[Shape, Integers]]:
     Faces of collapsed elements are triangles, or none if only a line or a point is left of them.
     """
     found: dict[str, tuple[Shape, list[Integers]]] = {}
-    first = 0
-    for block in deck.blocks:
-        own = faces[(faces[:, 0] >= first) & (faces[:, 0] < first + len(block.labels))] - [first, 0]
-        first += len(block.labels)
+    for _, block, own in by_block(deck.blocks, faces):
         shape = block.type.shape
         for number in np.unique(own[:, 1]).tolist():
             rows = own[own[:, 1] == number, 0]
@@ -106,14 +102,13 @@ def faces_of_nodes(deck: Deck, nodes: Integers) -> Integers:
     """Faces (k, 2) of bodies that belong to one element only and all of whose corners are among some nodes."""
     free, given = free_faces(deck), np.zeros(len(deck.points), dtype=bool)
     given[nodes] = True
-    first, found = 0, [_NO_FACES]
-    for block in deck.blocks:
-        own = free[(free[:, 0] >= first) & (free[:, 0] < first + len(block.labels))]
+    found = [_NO_FACES]
+    for first, block, own in by_block(deck.blocks, free):
         for number in np.unique(own[:, 1]).tolist():
             faces = own[own[:, 1] == number]
             corners = [node for node in block.type.shape.faces[number] if node < block.type.shape.corners]
-            found.append(faces[np.all(given[block.nodes[faces[:, 0] - first][:, corners]], axis=1)])
-        first += len(block.labels)
+            whole = np.all(given[block.nodes[faces[:, 0]][:, corners]], axis=1)
+            found.append(faces[whole] + np.array([first, 0]))
     return np.concatenate(found)
 
 

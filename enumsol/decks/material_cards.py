@@ -19,9 +19,7 @@ _WIDTH = 8
 @card("MATERIAL", "NAME")
 def material(reading: Reading, given: Card) -> str:
     """*MATERIAL: what follows belongs to it."""
-    name = given.needed("NAME")
-    if name in reading.deck.materials:
-        raise given.refused(f"is named {name} like another one; expected names that differ")
+    name = given.new_name(reading.deck.materials)
     made = reading.deck.materials[name] = reading.material = Material(name, given.place)
     return f"material {made.name}"
 

@@ -6,12 +6,13 @@ A new card is a function with `@card(...)` in one of the modules whose names end
 from __future__ import annotations
 
 import difflib
-from collections.abc import Callable, Collection
+from collections.abc import Callable, Collection, Mapping
 from dataclasses import dataclass, field
+from types import MappingProxyType
 
 from enumsol.decks.cards import Card
-from enumsol.decks.model import Account, Deck, DeckRegion, Material
-from enumsol.decks.steps import Analysis
+from enumsol.decks.model import Account, Coupling, Deck, DeckRegion, Material
+from enumsol.errors import InvalidArgumentError
 
 #: Function that puts a card into the description, and returns what became of it in words; None for no words.
 Reader = Callable[["Reading", Card], str | None]
@@ -38,6 +39,10 @@ class Reading:
         Key of the part or the instance that is being read, or "".
     material : Material or None
         The last one, to which what follows belongs.
+    changing : str or None
+        The interaction that cards which follow it belong to.
+    coupling : Coupling or None
+        One of which the next card says the kind.
     """
 
     deck: Deck
@@ -49,11 +54,8 @@ class Reading:
     part: str = ""
     instance: str = ""
     material: Material | None = None
-
-    @property
-    def analysis(self) -> Analysis:
-        """Description that cards of steps, contacts and constraints are put into."""
-        return self.deck.analysis
+    changing: str | None = None
+    coupling: Coupling | None = None
 
     @property
     def region(self) -> DeckRegion:
@@ -71,29 +73,17 @@ class Reading:
             It is not known, or not as expected.
         """
         name = compact(card.name)
-        is_known = any(name in table for table in (CARDS, HARMLESS, REFUSED))
-        close = [] if is_known else difflib.get_close_matches(name, CARDS, n=1, cutoff=0.87)
-        if self.bare and not any(own in OF_MESH for own in (name, *close)):
+        known = [own for own, rule in CARDS.items() if rule.options is not None]
+        close = [] if name in CARDS else difflib.get_close_matches(name, known, n=1, cutoff=0.87)
+        if self.bare and not any(CARDS[own].of_mesh for own in (name, *close) if own in CARDS):
             return
         if name in self.ignore:
             self.account(card, "not used, as you say", used=False)
         elif name in CARDS:
-            rule = CARDS[name]
-            if unknown := [option for option in card.options if compact(option) not in rule.options]:
-                known = f"none but {', '.join(sorted(rule.options))}" if rule.options else "none"
-                raise card.refused(f"has the option {unknown[0]}, which is not read; expected {known}")
-            if (became := rule.read(self, card)) is not None:
-                passed = [option for option in card.options if compact(option) in rule.passed]
-                said = f"; {', '.join(passed)} {'is' if len(passed) == 1 else 'are'} not used" if passed else ""
-                self.account(card, became + said)
-        elif name in HARMLESS:
-            self.account(card, f"not used: {HARMLESS[name]}", used=False)
+            CARDS[name].apply(self, card)
         else:
-            found, without = REFUSED.get(name, ("is not read, and may change the answer", "to do without it"))
-            raise card.refused(
-                f"{found}; expected {f'*{close[0]}' if close else 'other cards'}, or "
-                f'--ignore {card.name.replace(" ", "")} (in Python ignore=["..."]) {without}'
-            )
+            instead = f"*{close[0]}" if close else "other cards"
+            raise _refusal(card, "is not read, and may change the answer", "to do without it", instead)
 
     def account(self, card: Card, became: str, *, used: bool = True) -> None:
         """Note what became of a card."""
@@ -102,28 +92,59 @@ class Reading:
 
 @dataclass(frozen=True)
 class Rule:
-    """A function that reads a card, options that it knows, and those that change nothing."""
+    """How a card is read.
+
+    Attributes
+    ----------
+    read : function
+        Puts the card into the description.
+    options : set of str or None
+        Those that it knows, by their names without blanks; None for any.
+    passed : set of str
+        Those among them that change nothing.
+    refused : mapping of str to str
+        Those among them that are refused, and what is expected in their place.
+    of_mesh : bool
+        Whether a mesh alone depends on the card.
+    """
 
     read: Reader
-    options: frozenset[str]
-    passed: frozenset[str]
+    options: frozenset[str] | None = None
+    passed: frozenset[str] = frozenset()
+    refused: Mapping[str, str] = field(default_factory=dict)
+    of_mesh: bool = False
+
+    def apply(self, reading: Reading, card: Card) -> None:
+        """Check the options of a card, read it and note what became of it."""
+        given = {compact(option): option for option in card.options}
+        if self.options is not None and (unknown := given.keys() - self.options):
+            known = f"none but {', '.join(sorted(self.options))}" if self.options else "none"
+            first = next(option for own, option in given.items() if own in unknown)
+            raise card.refused(f"has the option {first}, which is not read; expected {known}")
+        if (other := next((option for option in self.refused if compact(option) in given), None)) is not None:
+            raise card.refused(f"has {other}; expected {self.refused[other]}")
+        if (became := self.read(reading, card)) is not None:
+            passed = [option for own, option in given.items() if own in self.passed]
+            said = f"; {', '.join(passed)} {'is' if len(passed) == 1 else 'are'} not used" if passed else ""
+            reading.account(card, became + said)
 
 
-#: Cards that are read, by their names without blanks.
+#: All cards that are known, by their names without blanks.
 CARDS: dict[str, Rule] = {}
-#: Cards that change nothing, by their names without blanks, and why.
-HARMLESS: dict[str, str] = {}
-#: Cards that are refused for a reason, by their names without blanks: what they are, and what it means to ignore them.
-REFUSED: dict[str, tuple[str, str]] = {}
 
 
-def card(name: str, *options: str, unused: Collection[str] = (), of_mesh: bool = False) -> Callable[[Reader], Reader]:
-    """Enter a function in the table of cards, with the options that it knows, and those that change nothing."""
+def card(
+    name: str,
+    *options: str,
+    unused: Collection[str] = (),
+    refuses: Mapping[str, str] = MappingProxyType({}),
+    of_mesh: bool = False,
+) -> Callable[[Reader], Reader]:
+    """Enter a function in the table of cards: options that it knows, that change nothing, and that are refused."""
 
     def entered(read: Reader) -> Reader:
         passed = frozenset(map(compact, unused))
-        CARDS[compact(name)] = Rule(read, passed.union(map(compact, options)), passed)
-        OF_MESH.update([compact(name)] if of_mesh else ())
+        CARDS[compact(name)] = Rule(read, passed.union(map(compact, (*options, *refuses))), passed, refuses, of_mesh)
         return read
 
     return entered
@@ -131,17 +152,25 @@ def card(name: str, *options: str, unused: Collection[str] = (), of_mesh: bool =
 
 def harmless(reason: str, *names: str) -> None:
     """Enter cards that change nothing."""
-    HARMLESS.update({compact(name): reason for name in names})
 
+    def pass_over(reading: Reading, given: Card) -> None:
+        reading.account(given, f"not used: {reason}", used=False)
 
-#: Cards of either kind that a mesh alone depends on.
-OF_MESH: set[str] = set()
+    CARDS.update({compact(name): Rule(pass_over) for name in names})
 
 
 def refused(found: str, without: str, *names: str, of_mesh: bool = False) -> None:
     """Enter cards that are refused: what they are, and what leaving them out means."""
-    REFUSED.update({compact(name): (found, without) for name in names})
-    OF_MESH.update(map(compact, names if of_mesh else ()))
+
+    def refuse(_: Reading, given: Card) -> None:
+        raise _refusal(given, found, without)
+
+    CARDS.update({compact(name): Rule(refuse, of_mesh=of_mesh) for name in names})
+
+
+def _refusal(card: Card, found: str, without: str, instead: str = "other cards") -> InvalidArgumentError:
+    spelled = card.name.replace(" ", "")
+    return card.refused(f'{found}; expected {instead}, or --ignore {spelled} (in Python ignore=["..."]) {without}')
 
 
 def compact(name: str) -> str:

@@ -11,14 +11,11 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from enumsol.decks.model import by_block
-from enumsol.decks.steps import FIELDS
-from enumsol.errors import InvalidArgumentError
+from enumsol.decks.model import FIELDS, by_block
 
 if TYPE_CHECKING:
     from enumsol.decks.cards import DeckPlace
-    from enumsol.decks.model import Deck
-    from enumsol.decks.steps import Act, DeckStep
+    from enumsol.decks.model import Act, Deck, DeckStep
     from enumsol.support.array_types import Integers
 
 #: What a value is given to: the card's kind, the number of a node or an element, and a component, a face or a label.
@@ -61,9 +58,9 @@ def states_of(deck: Deck) -> list[DeckState]:
         A line contradicts another one of its step, or names what is not in the deck.
     """
     acting, time = _Acting(deck), 0.0
-    acting.take(deck.analysis.initial, time)
+    acting.take(deck.initial, time)
     states = []
-    for step in deck.analysis.steps:
+    for step in deck.steps:
         time += step.period
         acting.take(step, time)
         states.append(acting.state())
@@ -74,7 +71,7 @@ class _Acting:
     """Terms (reference value, amplitude) of every key, step by step."""
 
     def __init__(self, deck: Deck) -> None:
-        self._deck, self._amplitudes = deck, deck.analysis.amplitudes
+        self._deck, self._amplitudes = deck, deck.amplitudes
         self._terms: dict[Key, list[tuple[float, str | None]]] = {}
         self._places: dict[Key, DeckPlace] = {}
         self._cards: dict[Key, str] = {}
@@ -89,11 +86,9 @@ class _Acting:
         self._begin_anew(step)
         given: dict[Key, DeckPlace] = {}
         for act in step.acts:
-            if act.amplitude is not None and act.amplitude not in self._amplitudes:
-                known = ", ".join(self._amplitudes) or "none"
-                raise InvalidArgumentError(
-                    f"{act.place}: *{act.card} names the amplitude {act.amplitude}; expected one of {known}"
-                )
+            if act.amplitude is not None:
+                said = f"*{act.card} names the amplitude {act.amplitude}"
+                act.place.entry(self._amplitudes, act.amplitude, said)
             for key, reference in _given_to(self._deck, act):
                 self._give(key, (reference, act.amplitude), act, given)
 
@@ -104,9 +99,9 @@ class _Acting:
             if card in step.fresh:
                 del self._terms[key], self._places[key], self._cards[key]
             elif card in loads and step.fresh & loads:
-                raise InvalidArgumentError(
-                    f"{step.place}: *{min(step.fresh & loads)} with OP=NEW follows loads by *{card}, which programs "
-                    "keep or take away; expected OP=NEW of both cards, or of none"
+                raise step.place.refused(
+                    f"*{min(step.fresh & loads)} with OP=NEW follows loads by *{card}, which programs keep or take "
+                    "away; expected OP=NEW of both cards, or of none"
                 )
 
     def _give(self, key: Key, term: tuple[float, str | None], act: Act, given: dict[Key, DeckPlace]) -> None:
@@ -114,15 +109,15 @@ class _Acting:
             self._terms[key].append(term)
             return
         if key in given and key[0] in ("BOUNDARY", "DLOAD", *FIELDS) and self._terms[key] != [term]:
-            raise InvalidArgumentError(
-                f"{act.place}: *{act.card} gives {self._named(key)} the value {term[0]:g}, and {given[key]} gives it "
+            raise act.place.refused(
+                f"*{act.card} gives {self._named(key)} the value {term[0]:g}, and {given[key]} gives it "
                 f"{self._terms[key][0][0]:g} in the same step; expected one value"
             )
         others = (own for own in self._terms if own[:2] == key[:2] and own != key and own not in given)
         if key[0] in FIELDS and (before := next(others, None)) is not None:
-            raise InvalidArgumentError(
-                f"{act.place}: *DLOAD gives {key[1]} {_OTHER_FIELDS[key[0]]} than {self._places[before]}, to "
-                "which programs add it or not; expected OP=NEW"
+            raise act.place.refused(
+                f"*DLOAD gives {key[1]} {_OTHER_FIELDS[key[0]]} than {self._places[before]}, to which programs add it "
+                "or not; expected OP=NEW"
             )
         self._terms[key], self._places[key], given[key] = [term], act.place, act.place
         self._cards[key] = act.card
@@ -159,14 +154,14 @@ def _given_to(deck: Deck, act: Act) -> list[tuple[Key, float]]:
     if act.label in FIELDS:
         length = float(np.linalg.norm(act.values[-3:]))
         if abs(length - 1.0) > _ROUNDED:
-            raise InvalidArgumentError(
-                f"{act.place}: *DLOAD has {act.label} with a direction of length {length:g}, which programs read "
-                "differently; expected length one"
+            raise act.place.refused(
+                f"*DLOAD has {act.label} with a direction of length {length:g}, which programs read differently; "
+                "expected length one"
             )
         return [((act.label, act.target, " ".join(map(repr, act.values[1:]))), act.values[0])]
     if act.card == "DSLOAD":
         if act.target not in deck.surfaces or deck.surfaces[act.target].nodes is not None:
-            raise InvalidArgumentError(f"{act.place}: there is no surface of faces {act.target}; expected *SURFACE")
+            raise act.place.refused(f"there is no surface of faces {act.target}; expected *SURFACE")
         faces = deck.surfaces[act.target].faces.tolist()
         return [(("DLOAD", element, f"P{face + 1}"), act.values[0]) for element, face in faces]
     rows = deck.elements_of(act.target, act.place)
@@ -181,7 +176,7 @@ def _check_face(deck: Deck, rows: Integers, act: Act) -> None:
         faces = len(block.type.shape.faces)
         if not 1 <= int(act.label[1:]) <= faces:
             has = f"has {faces} faces; expected one of these" if faces else "is no body; expected elements of bodies"
-            raise InvalidArgumentError(
-                f"{act.place}: *DLOAD loads {act.label} of element {deck.element_name(first + int(own[0]))} of type "
+            raise act.place.refused(
+                f"*DLOAD loads {act.label} of element {deck.element_name(first + int(own[0]))} of type "
                 f"{block.type.name}, which {has}"
             )

@@ -5,10 +5,10 @@ from __future__ import annotations
 from itertools import pairwise
 from typing import TYPE_CHECKING
 
-from enumsol.decks.cards import is_number, key
+from enumsol.decks.cards import key, target_of
 from enumsol.decks.contact_cards import pair_named
+from enumsol.decks.model import FIELDS, Act, Amplitude, DeckStep
 from enumsol.decks.registry import card, compact, harmless, refused
-from enumsol.decks.steps import FIELDS, Act, Amplitude, DeckStep
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -30,7 +30,10 @@ SUPPORTS = {
 #: Loads that are forces per volume along an axis.
 VOLUME = ("BX", "BY", "BZ")
 #: Options of cards of loads and displacements that make them something else.
-_OTHER = ("SUBMODEL", "USER", "MASS FLOW", "BASE NAME", "FIXED", "SECTOR", "FILE", "BSTEP", "TIME DELAY", "LOAD CASE")
+_OTHER = dict.fromkeys(
+    ("SUBMODEL", "USER", "MASS FLOW", "BASE NAME", "FIXED", "SECTOR", "FILE", "BSTEP", "TIME DELAY", "LOAD CASE"),
+    "values in the card itself",
+)
 #: Cards of other analyses than static ones.
 _ANALYSES = (
     "FREQUENCY", "COMPLEX FREQUENCY", "BUCKLE", "DYNAMIC", "MODAL DYNAMIC", "STEADY STATE DYNAMICS", "HEAT TRANSFER",
@@ -60,7 +63,7 @@ harmless("no heat is conducted", *(
 )
 def step(reading: Reading, given: Card) -> str:
     """*STEP: what follows belongs to a new step."""
-    if reading.analysis.steps and not reading.analysis.steps[-1].ended:
+    if reading.deck.steps and not reading.deck.steps[-1].ended:
         raise given.refused("begins before the step before it has ended; expected *END STEP")
     large = "NLGEOM" in given.options and given.name_of("NLGEOM") != "NO"
     if large and "NLGEOM" not in reading.ignore:
@@ -68,10 +71,8 @@ def step(reading: Reading, given: Card) -> str:
             'has NLGEOM, large displacements; expected small ones, or --ignore NLGEOM (in Python ignore=["NLGEOM"]) to '
             "take all displacements as small"
         )
-    own = DeckStep(given.place, given.options.get("NAME", "") or f"step {len(reading.analysis.steps) + 1}")
-    own.about_a_state = "PERTURBATION" in given.options
-    reading.analysis.steps.append(own)
-    return f"step {len(reading.analysis.steps)}" + ("; NLGEOM is ignored: displacements are small" if large else "")
+    reading.deck.steps.append(DeckStep(given.place, about_a_state="PERTURBATION" in given.options))
+    return f"step {len(reading.deck.steps)}" + ("; NLGEOM is ignored: displacements are small" if large else "")
 
 
 @card("END STEP")
@@ -82,23 +83,12 @@ def end_step(reading: Reading, given: Card) -> str | None:
         own.ended = True
         return None
     if not {compact(name) for name in _ANALYSES} & set(reading.ignore):
-        raise given.refused(f"ends step {len(reading.analysis.steps)}, which has no *STATIC; expected a static step")
-    reading.analysis.steps.pop()
-    return f"the step that begins in line {own.place.line if own.place else 0} is left out as a whole, as you say"
+        raise given.refused(f"ends step {len(reading.deck.steps)}, which has no *STATIC; expected a static step")
+    reading.deck.steps.pop()
+    return f"the step that begins in line {own.place.line} is left out as a whole, as you say"
 
 
-@card(
-    "STATIC",
-    unused=(
-        "SOLVER",
-        "DIRECT",
-        "EXPLICIT",
-        "STABILIZE",
-        "FACTOR",
-        "ALLSDTOL",
-        "CONTINUE",
-    ),
-)
+@card("STATIC", unused=("SOLVER", "DIRECT", "EXPLICIT", "STABILIZE", "FACTOR", "ALLSDTOL", "CONTINUE"))
 def static(reading: Reading, given: Card) -> str:
     """*STATIC: its time counts for amplitudes."""
     own = _step(reading, given)
@@ -126,11 +116,10 @@ def model_change(reading: Reading, given: Card) -> str:
     return f"in contact {word}: {_some(':'.join(pair) for pair in own.contacts)}"
 
 
-@card("BOUNDARY", "OP", "AMPLITUDE", "TYPE", *_OTHER)
+@card("BOUNDARY", "OP", "AMPLITUDE", "TYPE", refuses=_OTHER)
 def boundary(reading: Reading, given: Card) -> str:
     """*BOUNDARY: components of nodes that are held or moved."""
-    if (kind := given.name_of("TYPE")) not in ("", "DISPLACEMENT"):
-        raise given.refused(f"has TYPE={kind}; expected displacements")
+    given.choice("TYPE", ("", "DISPLACEMENT"), "displacements")
     acts = []
     for row, entries in given.rows():
         label = key(entries[1]) if len(entries) > 1 else ""
@@ -138,33 +127,25 @@ def boundary(reading: Reading, given: Card) -> str:
         if label in SUPPORTS:
             what = SUPPORTS[label]
         else:
-            what = _components(given, row, entries[1:3])
+            what = given.components(row, entries[1:3])
             value = given.number(entries[3], row) if len(entries) > 3 else 0.0
         acts.append(_act(given, row, entries, "", what, (value,)))
     return _given(reading, given, "BOUNDARY", acts)
 
 
-def _components(given: Card, row: int, entries: list[str]) -> tuple[int, ...]:
-    """Components from one to another, or one of them."""
-    ends = [given.integer(entry, row) for entry in entries if entry]
-    if not ends or not 1 <= ends[0] <= ends[-1] <= 6:
-        raise given.refused(f"has the components {', '.join(map(str, ends)) or 'none'}; expected some from 1 to 6", row)
-    return tuple(range(ends[0], ends[-1] + 1))
-
-
-@card("CLOAD", "OP", "AMPLITUDE", "FOLLOWER", *_OTHER)
+@card("CLOAD", "OP", "AMPLITUDE", "FOLLOWER", refuses=_OTHER)
 def cload(reading: Reading, given: Card) -> str:
     """*CLOAD: forces on nodes, and moments on reference nodes."""
     _without_following(given)
     acts = []
     for row, entries in given.rows():
-        component = _components(given, row, entries[1:2])
+        component = given.components(row, entries[1:2])
         acts.append(_act(given, row, entries, "", component, (_last(given, row, entries, 2),)))
     return _given(reading, given, "CLOAD", acts)
 
 
-@card("DLOAD", "OP", "AMPLITUDE", "FOLLOWER", *_OTHER, unused=("CONSTANT RESULTANT",))
-@card("DSLOAD", "OP", "AMPLITUDE", "FOLLOWER", *_OTHER, unused=("CONSTANT RESULTANT",))
+@card("DLOAD", "OP", "AMPLITUDE", "FOLLOWER", unused=("CONSTANT RESULTANT",), refuses=_OTHER)
+@card("DSLOAD", "OP", "AMPLITUDE", "FOLLOWER", unused=("CONSTANT RESULTANT",), refuses=_OTHER)
 def dload(reading: Reading, given: Card) -> str:
     """*DLOAD and *DSLOAD: pressures on faces of elements or on surfaces, forces per volume, gravity and rotation."""
     _without_following(given)
@@ -187,21 +168,21 @@ def dload(reading: Reading, given: Card) -> str:
     return _given(reading, given, "DLOAD", acts)
 
 
-@card("TEMPERATURE", "OP", "AMPLITUDE", *_OTHER)
+@card("TEMPERATURE", "OP", "AMPLITUDE", refuses=_OTHER)
 def temperature(reading: Reading, given: Card) -> str:
     """*TEMPERATURE: temperatures of nodes at the end of the step."""
     acts = [_act(given, row, entries, "", (), (_last(given, row, entries, 1),)) for row, entries in given.rows()]
     return _given(reading, given, "TEMPERATURE", acts)
 
 
-@card("INITIAL CONDITIONS", "TYPE", *_OTHER)
+@card("INITIAL CONDITIONS", "TYPE", refuses=_OTHER)
 def initial_conditions(reading: Reading, given: Card) -> str:
     """*INITIAL CONDITIONS: temperatures at which nothing is strained."""
-    if (kind := given.needed("TYPE")) != "TEMPERATURE":
-        raise given.refused(f"has TYPE={kind}; expected TEMPERATURE")
-    if reading.analysis.steps:
+    given.needed("TYPE")
+    given.choice("TYPE", ("TEMPERATURE",), "TEMPERATURE")
+    if reading.deck.steps:
         raise given.refused("stands behind a *STEP; expected it before the first one")
-    reading.analysis.initial.acts += [
+    reading.deck.initial.acts += [
         _act(given, row, entries, "", (), (_last(given, row, entries, 1),)) for row, entries in given.rows()
     ]
     return "temperatures at which nothing is strained"
@@ -221,7 +202,7 @@ def amplitude(reading: Reading, given: Card) -> str:
     if len(times) != len(factors) or not times or any(b < a for a, b in pairwise(times)):
         raise given.refused("has no pairs of rising times and factors; expected time, factor, time, factor, ...")
     total = given.name_of("TIME").replace(" ", "") == "TOTALTIME"
-    reading.analysis.amplitudes[name] = Amplitude(tuple(times), tuple(factors), total, kind == "SMOOTHSTEP")
+    reading.deck.amplitudes[name] = Amplitude(tuple(times), tuple(factors), total, kind == "SMOOTHSTEP")
     return f"factors of {'all steps' if total else 'a step'} up to time {times[-1]:g}, where it is {factors[-1]:g}"
 
 
@@ -230,13 +211,10 @@ def change_friction(reading: Reading, given: Card) -> str:
     """*CHANGE FRICTION: the *FRICTION after it is that of an interaction from this step on."""
     name = given.needed("INTERACTION")
     own = _step(reading, given)
-    if name not in reading.analysis.interactions:
-        raise given.refused(
-            f"names the interaction {name}; expected one of {', '.join(reading.analysis.interactions) or 'none'}"
-        )
-    own.friction[name] = reading.analysis.interactions[name].friction
-    reading.analysis.changing = name
-    return f"friction of {name} changes in step {len(reading.analysis.steps)}"
+    known = given.place.entry(reading.deck.interactions, name, f"*{given.name} names the interaction {name}")
+    own.friction[name] = known.friction
+    reading.changing = name
+    return f"friction of {name} changes in step {len(reading.deck.steps)}"
 
 
 def _act(
@@ -246,8 +224,9 @@ def _act(
     named = entries[0] if entries else ""
     if not named and label not in FIELDS:  # which acts on all elements then
         raise given.refused("has a line without a node, an element or a set; expected one of them", row)
-    target = named if is_number(named) else key(named)
-    return Act(given.name, given.at(row), target, label, components, values, given.name_of("AMPLITUDE") or None)
+    return Act(
+        given.name, given.at(row), target_of(named), label, components, values, given.name_of("AMPLITUDE") or None
+    )
 
 
 def _last(given: Card, row: int, entries: list[str], place: int) -> float:
@@ -264,17 +243,14 @@ def _without_following(given: Card) -> None:
 
 def _step(reading: Reading, given: Card) -> DeckStep:
     """The step that a card is in."""
-    if not reading.analysis.steps or reading.analysis.steps[-1].ended:
+    if not reading.deck.steps or reading.deck.steps[-1].ended:
         raise given.refused("stands outside of steps; expected it between *STEP and *END STEP")
-    return reading.analysis.steps[-1]
+    return reading.deck.steps[-1]
 
 
 def _given(reading: Reading, given: Card, kind: str, acts: list[Act]) -> str:
     """Add what a card gives to its step, or displacements to the model before the first one."""
-    other = next((name for name in _OTHER if name in given.options), None)
-    if other is not None:
-        raise given.refused(f"has {other}; expected values in the card itself")
-    own = reading.analysis.initial if not reading.analysis.steps and kind == "BOUNDARY" else _step(reading, given)
+    own = reading.deck.initial if not reading.deck.steps and kind == "BOUNDARY" else _step(reading, given)
     anew = given.name_of("OP") == "NEW" and all(act.card != given.name for act in own.acts)  # the first one counts
     if anew:
         own.fresh.add(given.name)

@@ -15,6 +15,7 @@ from .mesh_problems import (
     mesh_scene as mesh_scene,
     read_mesh_problem as read_mesh_problem,
     read_mesh_scene as read_mesh_scene,
+    scene_steps as scene_steps,
 )
 from .meshes import (
     Mesh as Mesh,
@@ -27,7 +28,6 @@ from .meshes import (
     rectangle as rectangle,
     trapezoid as trapezoid,
 )
-from .scene_steps import scene_steps as scene_steps
 from .scenes import Scene as Scene
 from .solid_problems import (
     facet_forces as facet_forces,

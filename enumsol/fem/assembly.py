@@ -26,7 +26,7 @@ from enumsol.fem.restrained import Body, Supports, axes_of, gathered, movable, p
 from enumsol.model.cells import numbers_of_nodes
 from enumsol.model.mesh import BodyMesh
 from enumsol.support.arguments import shown
-from enumsol.support.array_arguments import plain_array, real_array, real_matrix
+from enumsol.support.array_arguments import array_of, plain_array, real_matrix
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
@@ -501,9 +501,4 @@ def pressed(vectors: Floats, nodes: Integers) -> Floats:
 
 
 def _vector(value: object, name: str, size: int) -> Floats:
-    if value is None:
-        return np.zeros(size)
-    array = real_array(value, name, error=InvalidArgumentError)
-    if array.shape != (size,):
-        raise InvalidArgumentError(f"{name} has shape {array.shape}; expected ({size},), as the basis has")
-    return array
+    return np.zeros(size) if value is None else array_of(value, name, (size,), f"({size},), as the basis has")

@@ -12,6 +12,7 @@ import scipy.sparse as sp
 from enumsol.errors import InvalidArgumentError
 from enumsol.fem.meshes import cell_name, check_every_node_is_used, check_facets
 from enumsol.model.cells import KINDS, boundary, by_kind, corner_keys, node_counts
+from enumsol.model.mesh import assembled
 from enumsol.support.arguments import instance_of
 from enumsol.support.array_arguments import vector_of
 
@@ -184,7 +185,7 @@ class NodalBasis:
     def stiffness(self, elasticity: Floats) -> sp.csc_array:
         """Stiffness of a linear elastic body, (d N, d N), of (s, s) moduli of all cells or (M, s, s) of each."""
         moduli = np.broadcast_to(elasticity, (self.count, self.components, self.components))
-        rows, columns, data = [], [], []
+        parts = []
         with np.errstate(over="ignore", invalid="ignore"):  # problems refuse what is not finite
             for block in self.blocks:
                 weights, d = self.weights(block), self.shape[1]
@@ -197,10 +198,8 @@ class NodalBasis:
                     if self.incompatible is not None and (block.kind.form, block.kind.degree) in _INCOMPATIBLE:
                         K -= self._relieved(block, some, B, D) * self.incompatible[block.rows[some], None, None]
                     dofs = (d * block.nodes[some, :, None] + np.arange(d)).reshape(len(B), size)
-                    rows.append(np.repeat(dofs, size, axis=1).ravel())
-                    columns.append(np.tile(dofs, size).ravel())
-                    data.append(K.ravel())
-            return _gathered(rows, columns, data, self.shape[0] * self.shape[1])
+                    parts.append((dofs, K))
+            return _symmetric(parts, self.shape[0] * self.shape[1])
 
     def _relieved(self, block: Block, some: slice, B: Floats, D: Floats) -> Floats:
         """Stiffness that incompatible modes take off cells when they are condensed, (k, a d, a d)."""
@@ -218,17 +217,14 @@ class NodalBasis:
 
     def gram(self) -> sp.csc_array:
         """Products of functions and of their gradients, (N, N): those of one component in H^1."""
-        rows, columns, data = [], [], []
+        parts = []
         for block in self.blocks:
             for some in block.some(block.values.size * (self.shape[1] + block.nodes.shape[1])):
                 G, weights = block.gradients(some), block.dx[some]
                 K = np.einsum("mqai,mqbi,mq->mab", G, G, weights, optimize=True)
                 K += np.einsum("aq,bq,mq->mab", block.values, block.values, weights, optimize=True)
-                own = block.nodes[some]
-                rows.append(np.repeat(own, own.shape[1], axis=1).ravel())
-                columns.append(np.tile(own, own.shape[1]).ravel())
-                data.append(K.ravel())
-        return _gathered(rows, columns, data, self.shape[0])
+                parts.append((block.nodes[some], K))
+        return _symmetric(parts, self.shape[0])
 
     def on_part(
         self, facets: Integers, name: str, traction: Callable[[Floats], Floats | float], *, lumped: bool = False
@@ -346,10 +342,9 @@ class NodalBasis:
         return found
 
 
-def _gathered(rows: list[Integers], columns: list[Integers], data: list[Floats], size: int) -> sp.csc_array:
-    """The matrix of these entries, made exactly symmetric."""
-    places = (np.concatenate(rows), np.concatenate(columns))
-    A = sp.csc_array((np.concatenate(data), places), shape=(size, size))
+def _symmetric(parts: list[tuple[Integers, Floats]], size: int) -> sp.csc_array:
+    """The matrix of these parts, as of `assembled`, made exactly symmetric."""
+    A = assembled(parts, size)
     return sp.csc_array(0.5 * (A + A.T))
 
 

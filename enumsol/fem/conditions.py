@@ -14,8 +14,8 @@ import numpy as np
 import scipy.sparse as sp
 
 from enumsol.errors import InvalidArgumentError
+from enumsol.fem.mesh_files import mesh_of
 from enumsol.fem.meshes import SAME, unit_vectors
-from enumsol.fem.placing import mesh_of
 from enumsol.fem.restrained import RIGHT_ANGLE, Supports
 from enumsol.model.problem import given_friction, old_friction
 from enumsol.support.arguments import finite_number, one_of, shown
@@ -39,56 +39,56 @@ if TYPE_CHECKING:
 FRICTION = "friction", "friction_slope", "friction2", "friction2_slope"
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class Options:
     """Options of `mesh_problem`, which says what each stands for."""
 
-    young: float | Mapping[str, float] | None
-    poisson: float | Mapping[str, float] | None
-    orthotropic: Sequence[float] | Mapping[str, Sequence[float]] | None
-    orientation: Sequence[float] | Mapping[str, Sequence[float]] | None
-    incompatible: bool | Names | None
-    contact: Names
-    pairs: Sequence[Sequence[Any]]
-    plane: Plane | Mapping[str, Plane] | None
-    thickness: float | Mapping[str, float]
-    expansion: float | Mapping[str, float] | None
-    temperature: ArrayLike | Mapping[str, float] | None
-    temperature_slope: ArrayLike | Mapping[str, float] | None
-    density: float | Mapping[str, float] | None
-    friction: Coefficients
-    friction_slope: Coefficients
-    friction2: Coefficients
-    friction2_slope: Coefficients
-    axis: ArrayLike | None
-    clamp: Names
-    symmetry: Names
-    displacement: Mapping[str, Sequence[Any]] | None
-    displacement_slope: Mapping[str, Sequence[Any]] | None
-    transform: Mapping[str, Mapping[str, ArrayLike]] | None
-    tie: Sequence[Sequence[Any]]
-    reference: Vectors
-    rigid: Mapping[str, Names] | None
-    coupling: Mapping[str, Names] | None
-    equations: Sequence[Mapping[str, Any]]
-    spring: Vectors
-    node_spring: Mapping[str, Any] | None
-    load: Vectors
-    load_slope: Vectors
-    pressure: Mapping[str, float] | None
-    pressure_slope: Mapping[str, float] | None
-    body_force: ArrayLike | Mapping[str, ArrayLike] | None
-    body_force_slope: ArrayLike | Mapping[str, ArrayLike] | None
-    centrifugal: Mapping[str, ArrayLike] | None
-    centrifugal_slope: Mapping[str, ArrayLike] | None
-    force: Vectors
-    force_slope: Vectors
-    moment: Mapping[str, Any] | None
-    moment_slope: Mapping[str, Any] | None
-    gap: float | Mapping[str, float]
-    obstacle: Mapping[str, Sequence[float]] | None
-    max_rigid_displacement: float | Literal["auto"] | None
-    groups: str | None
+    young: float | Mapping[str, float] | None = None
+    poisson: float | Mapping[str, float] | None = None
+    orthotropic: Sequence[float] | Mapping[str, Sequence[float]] | None = None
+    orientation: Sequence[float] | Mapping[str, Sequence[float]] | None = None
+    incompatible: bool | Names | None = None
+    contact: Names = ()
+    pairs: Sequence[Sequence[Any]] = ()
+    plane: Plane | Mapping[str, Plane] | None = None
+    thickness: float | Mapping[str, float] = 1.0
+    expansion: float | Mapping[str, float] | None = None
+    temperature: ArrayLike | Mapping[str, float] | None = None
+    temperature_slope: ArrayLike | Mapping[str, float] | None = None
+    density: float | Mapping[str, float] | None = None
+    friction: float | Mapping[str, float] | None = None
+    friction_slope: float | Mapping[str, float] | None = None
+    friction2: float | Mapping[str, float] | None = None
+    friction2_slope: float | Mapping[str, float] | None = None
+    axis: ArrayLike | None = None
+    clamp: Names = ()
+    symmetry: Names = ()
+    displacement: Mapping[str, Sequence[Any]] | None = None
+    displacement_slope: Mapping[str, Sequence[Any]] | None = None
+    transform: Mapping[str, Mapping[str, ArrayLike]] | None = None
+    tie: Sequence[Sequence[Any]] = ()
+    reference: Vectors = None
+    rigid: Mapping[str, Names] | None = None
+    coupling: Mapping[str, Names] | None = None
+    equations: Sequence[Mapping[str, Any]] = ()
+    spring: Vectors = None
+    node_spring: Mapping[str, Any] | None = None
+    load: Vectors = None
+    load_slope: Vectors = None
+    pressure: Mapping[str, float] | None = None
+    pressure_slope: Mapping[str, float] | None = None
+    body_force: ArrayLike | Mapping[str, ArrayLike] | None = None
+    body_force_slope: ArrayLike | Mapping[str, ArrayLike] | None = None
+    centrifugal: Mapping[str, ArrayLike] | None = None
+    centrifugal_slope: Mapping[str, ArrayLike] | None = None
+    force: Vectors = None
+    force_slope: Vectors = None
+    moment: Mapping[str, Any] | None = None
+    moment_slope: Mapping[str, Any] | None = None
+    gap: float | Mapping[str, float] = 0.0
+    obstacle: Mapping[str, Sequence[float]] | None = None
+    max_rigid_displacement: float | Literal["auto"] | None = None
+    groups: str | None = None
 
     def with_friction_along_axes(self, dimension: int) -> Options:
         """Options without pairs of coefficients, which are those along two axes in 3D, and with a coefficient.
@@ -164,8 +164,6 @@ def _in_python(option: str, part: str, number: str) -> str:
     return f'{option}={{"{part}": {number}}}' if part else f"{option}={number}"
 
 
-#: Components of a centrifugal force below this part of its numbers are rounding.
-_ROUNDING = 1e-9
 #: What stands for a component that is not given.
 FREE = "free"
 #: Numbers that an obstacle takes in 2D and 3D: a point and a normal, or a centre and a radius.
@@ -450,7 +448,7 @@ def centrifugal_of(mesh: PartedMesh, value: object, name: str, *, axisymmetric: 
         across = max(np.max(np.abs(slope[d:, :d]), initial=0.0), np.max(np.abs(at_origin[d:]), initial=0.0))
         if axisymmetric:
             across = max(across, np.max(np.abs(slope[:d, 1])), np.max(np.abs(at_origin)))
-        if across > _ROUNDING * np.max(np.abs(numbers)):
+        if across > RIGHT_ANGLE * np.max(np.abs(numbers)):
             expected = "the y axis of an axisymmetric body" if axisymmetric else "one across the plane, or within it"
             raise InvalidArgumentError(f"{own} has the axis {shown(numbers[1:].tolist())}; expected {expected}")
         rows = mesh.body(part)

@@ -12,7 +12,7 @@ import scipy.sparse as sp
 from enumsol.errors import InvalidArgumentError
 from enumsol.fem.assembly import pressed
 from enumsol.fem.conditions import Obstacle, names_of
-from enumsol.fem.meshes import unit_vectors
+from enumsol.fem.meshes import SAME, unit_vectors
 from enumsol.fem.restrained import ContactRows, Supports, means_of_nodes, movable
 from enumsol.model.cells import KINDS, boundary_facets, by_kind, contact_nodes, facet_rows, lines_along, padded
 from enumsol.support.arguments import finite_number, shown
@@ -32,8 +32,6 @@ _BEHIND = -1e-6
 _BEYOND = 1e-6
 #: Shape functions below this are rounding at a node.
 _AT_NODE = 1e-10
-#: A gap below this share of the extent of the mesh is rounding, and none; so is what is left of Newton's equation.
-_TOUCHING = 1e-9
 #: Newton's steps at most to a point of a facet; of plane triangles and straight edges the first is the last.
 _STEPS = 30
 #: A share of a uniform pressure below this part of the largest is rounding of none.
@@ -156,6 +154,12 @@ class Contacts:
     areas: Floats
     groups: list[Group]
 
+    @property
+    def by_group(self) -> list[tuple[Group, slice]]:
+        """Groups, each with the rows of its nodes."""
+        ends = np.cumsum([group.count for group in self.groups]).tolist()
+        return [(group, slice(end - group.count, end)) for group, end in zip(self.groups, ends, strict=True)]
+
     def without(self, nodes: Integers) -> Contacts:
         """Contacts without some nodes, whose areas go to the others of their group.
 
@@ -164,9 +168,8 @@ class Contacts:
         InvalidArgumentError
             No others are left to a group.
         """
-        kept, areas, groups, first = ~np.isin(self.rows.nodes, nodes), self.areas.copy(), [], 0
-        for group in self.groups:
-            own = slice(first, first := first + group.count)
+        kept, areas, groups = ~np.isin(self.rows.nodes, nodes), self.areas.copy(), []
+        for group, own in self.by_group:
             if not np.any(kept[own]):
                 raise InvalidArgumentError(f"contact of {group} has no node that can be in contact; expected some")
             if np.any(areas[own]):
@@ -264,19 +267,9 @@ def _group(
             f"all nodes of {parts[0]} belong to another contact already; expected a boundary of its own for the pair "
             f"{pair}"
         )
-    if pair is not None and not len(facets):
-        normals = normals_against(body, mesh, touching, pair.master)
-        normals = unit_vectors(np.where(held.mirrored[touching], 0.0, normals), "normals at the plane of symmetry")
-        rows, gaps, group = _paired(body, mesh, touching, normals, held, pair)
-        return rows, gaps, replace(group, shared=shared)
     # the circumference is none on the axis, which has a normal all the same
     integrals = replace(body, axisymmetric=False).on_part(facets, "contact", np.asarray, lumped=True)
-    if obstacle is None:
-        normals = unit_vectors(pressed(integrals[touching], touching), "normals of the boundary")
-        # what averages with the other half of the body would be
-        normals = unit_vectors(np.where(held.mirrored[touching], 0.0, normals), "normals at the plane of symmetry")
-        own, gaps = normals, np.zeros(len(touching))
-    else:
+    if obstacle is not None:
         given = Obstacle.of(obstacle, mesh.points.shape[1])
         normals, gaps = given.normals_and_gaps(mesh.points[touching])
         own = np.nan_to_num(integrals[touching] / np.linalg.norm(integrals[touching], axis=1, keepdims=True))
@@ -285,11 +278,19 @@ def _group(
                 f"obstacle {given.kind} is behind the contact boundary, whose outward normals point away from it; "
                 f"expected {given.expected}"
             )
-    if pair is None:
-        nodes = movable(touching, normals, held)
-        return nodes, gaps[nodes.kept], Group(parts, None, own[nodes.kept], len(nodes.nodes))
-    rows, gaps, group = _paired(body, mesh, touching, normals, held, pair)
-    return rows, gaps, replace(group, shared=shared)
+    else:
+        if pair is not None and not len(facets):
+            normals = normals_against(body, mesh, touching, pair.master)
+        else:
+            normals = unit_vectors(pressed(integrals[touching], touching), "normals of the boundary")
+        # what averages with the other half of the body would be
+        normals = unit_vectors(np.where(held.mirrored[touching], 0.0, normals), "normals at the plane of symmetry")
+        own, gaps = normals, np.zeros(len(touching))
+    if pair is not None:
+        rows, gaps, group = _paired(body, mesh, touching, normals, held, pair)
+        return rows, gaps, replace(group, shared=shared)
+    nodes = movable(touching, normals, held)
+    return nodes, gaps[nodes.kept], Group(parts, None, own[nodes.kept], len(nodes.nodes))
 
 
 def _touching(body: NodalBasis, part: str, facets: Integers) -> Integers:
@@ -384,7 +385,7 @@ def normals_against(body: NodalBasis, mesh: PartedMesh, nodes: Integers, master:
     facets = _facets(body, {master: mesh.part(master)})
     away = body.on_part(facets, master, np.asarray)[facets].sum(axis=1)
     targets = _Facets.all_of(mesh.points, facets)
-    tolerance = _TOUCHING * float(np.max(np.ptp(mesh.points, axis=0)))
+    tolerance = SAME * float(np.max(np.ptp(mesh.points, axis=0)))
     sums = np.zeros((len(nodes), mesh.points.shape[1]))
     for k, point in enumerate(mesh.points[nodes]):
         rows, distances, normals = map(np.concatenate, zip(*(own.nearest(point) for own in targets), strict=True))
@@ -421,7 +422,7 @@ def faced(
     others : (l, c) int array
         All other facets on the boundary of bodies: a node is inside the other body where none of them is between.
     """
-    tolerance = _TOUCHING * float(np.max(np.ptp(points, axis=0)))
+    tolerance = SAME * float(np.max(np.ptp(points, axis=0)))
     targets, between = (_Facets.all_of(points, rows) for rows in (facets, others))
     away = outward[facets].sum(axis=1)
     found = np.zeros(len(nodes), dtype=bool)

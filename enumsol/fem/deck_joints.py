@@ -14,13 +14,11 @@ import numpy as np
 from enumsol.decks.cards import is_number
 from enumsol.decks.faces import face_nodes
 from enumsol.decks.model import by_block
-from enumsol.errors import InvalidArgumentError
 
 if TYPE_CHECKING:
     from enumsol.decks.cards import DeckPlace
-    from enumsol.decks.model import Deck, ElementBlock
+    from enumsol.decks.model import Coupling, Deck, ElementBlock, NodalEquation, Spring, Transform
     from enumsol.decks.states import DeckState
-    from enumsol.decks.steps import Coupling, NodalEquation, Spring, Transform
     from enumsol.fem.deck_parts import DeckParts
     from enumsol.support.array_types import Integers
 
@@ -57,25 +55,25 @@ class DeckJoints:
     grounds: list[tuple[int, int, DeckPlace]] = field(default_factory=list)
 
     def __post_init__(self) -> None:
-        said = self.deck.analysis
-        for transform in said.transforms:
+        deck = self.deck
+        for transform in deck.transforms:
             self._transform(transform)
-        for pair in said.pairs:
-            if pair.tied or said.interactions[pair.interaction].tied:
-                if isinstance(pair.adjust, str):
-                    raise InvalidArgumentError(
-                        f"{pair.place}: *CONTACT PAIR of tied surfaces has ADJUST={pair.adjust}; expected a distance"
-                    )
-                self._add("tie", [pair.slave, pair.master, *([] if pair.adjust is None else [pair.adjust])])
-        for tie in said.ties:
+        tied = [pair for pair in deck.pairs if pair.tied or deck.interactions[pair.interaction].tied]
+        for pair in tied:
+            if isinstance(pair.adjust, str):
+                raise pair.place.refused(
+                    f"*CONTACT PAIR of tied surfaces has ADJUST={pair.adjust}; expected a distance"
+                )
+        for tie in deck.ties:
             for name in (tie.slave, tie.master):
                 self.parts.check_surface(name, tie.place, "TIE", faced=name == tie.master)
-            self._add("tie", [tie.slave, tie.master, *([] if tie.tolerance is None else [tie.tolerance])])
-        for coupling in said.couplings:
+        for pair in (*tied, *deck.ties):
+            self._add("tie", [pair.slave, pair.master, *([] if pair.adjust is None else [pair.adjust])])
+        for coupling in deck.couplings:
             self._couple(coupling)
-        for equation in said.equations:
+        for equation in deck.equations:
             self._equation(equation)
-        for spring in said.springs:
+        for spring in deck.springs:
             self._springs(spring)
 
     def slot(self, node: int, component: int) -> tuple[str, int] | None:
@@ -99,8 +97,8 @@ class DeckJoints:
         if self.dimension == 2:
             along = np.array(numbers[3:]) - numbers[:3] if given.kind == "C" else np.array([0, 0, numbers[2]])
             if np.any(along[:2]) or (given.kind == "R" and numbers[2]):
-                raise InvalidArgumentError(
-                    f"{given.place}: *TRANSFORM turns out of the plane of plane elements; expected axes within it"
+                raise given.place.refused(
+                    "*TRANSFORM turns out of the plane of plane elements; expected axes within it"
                 )
             numbers = numbers[:2]
         if len(rows):
@@ -118,16 +116,16 @@ class DeckJoints:
     def _couple(self, given: Coupling) -> None:
         needed = {1, 2, 3} if self.dimension == 3 else {1, 2}
         if given.kind == "kinematic" and not needed <= set(given.components):
-            raise InvalidArgumentError(
-                f"{given.place}: *{given.card} couples the components {', '.join(map(str, given.components))}; "
-                f"expected all displacements, {min(needed)} to {max(needed)}"
+            raise given.place.refused(
+                f"*{given.card} couples the components {', '.join(map(str, given.components))}; expected all "
+                f"displacements, {min(needed)} to {max(needed)}"
             )
         row = int(self.deck.nodes_of(given.reference, given.place)[0])
         nodes, wanted = self._coupled(given)
         if len(self.parts.in_bodies(np.array([row]))):
             if given.kind == "distributing":
-                raise InvalidArgumentError(
-                    f"{given.place}: *{given.card} has a node of a body as its reference; expected a node of no body"
+                raise given.place.refused(
+                    f"*{given.card} has a node of a body as its reference; expected a node of no body"
                 )
             nodes, wanted = np.union1d(nodes, [row]), f"{wanted} with node {self.deck.node_name(row)}"
         name = self.point(row)
@@ -141,10 +139,7 @@ class DeckJoints:
         """Nodes of bodies that a coupling names, and a name for them."""
         deck, name = self.deck, given.target
         if given.card == "COUPLING":
-            if name not in deck.surfaces:
-                known = ", ".join(deck.surfaces) or "none"
-                raise InvalidArgumentError(f"{given.place}: *COUPLING names {name}; expected a surface, one of {known}")
-            own = deck.surfaces[name]
+            own = given.place.entry(deck.surfaces, name, f"*COUPLING names {name}", "a surface, one of")
             rows = own.nodes
             if rows is None:
                 rows = np.unique(np.concatenate([nodes.ravel() for _, nodes in face_nodes(deck, own.faces)]))
@@ -156,7 +151,7 @@ class DeckJoints:
             rows = np.unique(np.concatenate(found))
         rows = self.parts.in_bodies(rows)
         if not len(rows):
-            raise InvalidArgumentError(f"{given.place}: *{given.card} couples no node of a body; expected some")
+            raise given.place.refused(f"*{given.card} couples no node of a body; expected some")
         return rows, name
 
     def _node(self, row: int) -> str:
@@ -175,8 +170,8 @@ class DeckJoints:
             found.append((rows[np.argsort(deck.node_labels[rows], kind="stable")], component, coefficient))
         count = max(len(rows) for rows, _, _ in found)
         if any(len(rows) not in (1, count) for rows, _, _ in found):
-            raise InvalidArgumentError(
-                f"{given.place}: *{given.card} has sets of different sizes; expected sets of one size, or single nodes"
+            raise given.place.refused(
+                f"*{given.card} has sets of different sizes; expected sets of one size, or single nodes"
             )
         for k in range(count):
             terms = []
@@ -184,9 +179,9 @@ class DeckJoints:
                 row = int(rows[k % len(rows)])
                 slot = self.slot(row, component)
                 if component > self.dimension and (slot is None or slot[1] < 0):
-                    raise InvalidArgumentError(
-                        f"{given.place}: *{given.card} has component {component} of node {deck.node_name(row)}; "
-                        f"expected 1 to {self.dimension}"
+                    raise given.place.refused(
+                        f"*{given.card} has component {component} of node {deck.node_name(row)}; expected 1 to "
+                        f"{self.dimension}"
                     )
                 entry = component - 1 if slot is None else slot[1]
                 turns = ("rz",) if self.dimension == 2 else ("rx", "ry", "rz")
@@ -204,8 +199,8 @@ class DeckJoints:
         kind = block.type.name
         wanted = {"SPRING1": 1, "SPRING2": 2, "SPRINGA": 0}.get(kind)
         if wanted is None:
-            raise InvalidArgumentError(
-                f"{given.place}: *SPRING is given for elements of type {kind}; expected SPRING1, SPRING2 or SPRINGA"
+            raise given.place.refused(
+                f"*SPRING is given for elements of type {kind}; expected SPRING1, SPRING2 or SPRINGA"
             )
         components = set(given.components)
         if (
@@ -213,10 +208,9 @@ class DeckJoints:
             or len(components) > 1
             or max(components, default=1) > self.dimension
         ):
-            raise InvalidArgumentError(
-                f"{given.place}: *SPRING of type {kind} has the components "
-                f"{', '.join(map(str, given.components)) or 'none'}; expected one component of {wanted or 'no'} "
-                f"nodes, from 1 to {self.dimension}"
+            raise given.place.refused(
+                f"*SPRING of type {kind} has the components {', '.join(map(str, given.components)) or 'none'}; "
+                f"expected one component of {wanted or 'no'} nodes, from 1 to {self.dimension}"
             )
         for nodes in block.nodes[own].tolist():
             value: Any = given.stiffness
@@ -226,7 +220,7 @@ class DeckJoints:
             if 0 < len(inside) < len(nodes):
                 value = self._to_ground(given, inside[0], next(row for row in nodes if row not in inside), value)
             elif not inside:
-                raise InvalidArgumentError(f"{given.place}: *SPRING holds no node of a body; expected one")
+                raise given.place.refused("*SPRING holds no node of a body; expected one")
             self._spring(given, ":".join(self._node(row) for row in inside), value)
 
     def _to_ground(self, given: Spring, row: int, end: int, value: Any) -> list[float]:
@@ -234,9 +228,9 @@ class DeckJoints:
         if not isinstance(value, list):
             along = np.abs(self.deck.points[end] - self.deck.points[row])
             if np.sum(along > _ALIGNED * np.max(along)) != 1 or np.argmax(along) >= self.dimension:
-                raise InvalidArgumentError(
-                    f"{given.place}: *SPRING joins node {self.deck.node_name(row)} to node {self.deck.node_name(end)}, "
-                    "which belongs to no body, in a direction between the axes; expected one along an axis"
+                raise given.place.refused(
+                    f"*SPRING joins node {self.deck.node_name(row)} to node {self.deck.node_name(end)}, which belongs "
+                    "to no body, in a direction between the axes; expected one along an axis"
                 )
             value = [value if k == np.argmax(along) else 0.0 for k in range(self.dimension)]
         self.grounds += [(end, k + 1, given.place) for k, own in enumerate(value) if own]
@@ -252,9 +246,9 @@ class DeckJoints:
         """
         for row, component, place in self.grounds:
             if state.values.get(("BOUNDARY", row, component)) != 0.0:
-                raise InvalidArgumentError(
-                    f"{place}: *SPRING ends at node {self.deck.node_name(row)}, which belongs to no body and is not "
-                    f"held in component {component}; expected it held at 0"
+                raise place.refused(
+                    f"*SPRING ends at node {self.deck.node_name(row)}, which belongs to no body and is not held in "
+                    f"component {component}; expected it held at 0"
                 )
 
     def _spring(self, given: Spring, name: str, value: Any) -> None:
@@ -262,7 +256,5 @@ class DeckJoints:
         if name in springs and isinstance(springs[name], list) == isinstance(value, list):
             value = (np.array(springs[name]) + value).tolist()
         elif name in springs:
-            raise InvalidArgumentError(
-                f"{given.place}: *SPRING puts springs of two kinds between the same nodes; expected one kind"
-            )
+            raise given.place.refused("*SPRING puts springs of two kinds between the same nodes; expected one kind")
         springs[name] = value

@@ -15,9 +15,8 @@ if TYPE_CHECKING:
     from collections.abc import Iterator
 
     from enumsol.decks.cards import DeckPlace
-    from enumsol.decks.model import Deck, Material, Section
+    from enumsol.decks.model import ContactPair, Deck, Material, Section
     from enumsol.decks.states import DeckState
-    from enumsol.decks.steps import ContactPair
     from enumsol.fem.deck_joints import DeckJoints
     from enumsol.fem.deck_parts import DeckParts
     from enumsol.support.array_types import Floats, Integers
@@ -50,9 +49,7 @@ def _materials(deck: Deck, parts: DeckParts) -> dict[str, Any]:
         name = parts.elements(rows, section.elements)
         material = deck.materials[section.material]
         if not material.elastic:
-            raise InvalidArgumentError(
-                f"{material.place}: *MATERIAL {material.name} has no *ELASTIC; expected an elastic law"
-            )
+            raise material.place.refused(f"*MATERIAL {material.name} has no *ELASTIC; expected an elastic law")
         if material.elastic == "ISO":
             found["young"][name], found["poisson"][name] = map(float, material.constants)
         else:
@@ -61,21 +58,20 @@ def _materials(deck: Deck, parts: DeckParts) -> dict[str, Any]:
                 found["orientation"][name] = axes_of_section(deck, section)
         expansion = () if material.expansion is None else material.expansion.tolist()
         if len(expansion) > 1:
-            raise InvalidArgumentError(
-                f"{material.expansion_place}: *EXPANSION of {material.name} has {len(expansion)} coefficients; "
-                "expected one"
+            raise material.expansion_place.refused(
+                f"*EXPANSION of {material.name} has {len(expansion)} coefficients; expected one"
             )
         found["expansion"][name] = expansion[0] if expansion else 0.0
         if material.density:
             found["density"][name] = material.density
         found["thickness"][name] = section.thickness or 1.0
     options: dict[str, Any] = {name: found[name] for name in _BY_MATERIAL[:4] if found[name]}
-    warmed = any(act.card == "TEMPERATURE" for step in deck.analysis.steps for act in step.acts)
+    warmed = any(act.card == "TEMPERATURE" for step in deck.steps for act in step.acts)
     if warmed and any(found["expansion"].values()):
         options["expansion"] = found["expansion"]
     if found["density"].keys() == found["expansion"].keys():
         options["density"] = found["density"]
-    if is_plane(deck):
+    if deck.dimension == 2:
         options["plane"] = _planes(deck, parts)
     if set(found["thickness"].values()) != {1.0} and options.get("plane", "axisymmetric") != "axisymmetric":
         options["thickness"] = found["thickness"]
@@ -89,9 +85,9 @@ def _engineering_constants(material: Material) -> list[float]:
     d11, d12, d22, d13, d23, d33, *shear = map(float, material.constants)
     moduli = np.array([[d11, d12, d13], [d12, d22, d23], [d13, d23, d33]])
     if min(np.linalg.eigvalsh(moduli)) <= 0 or min(shear) <= 0:
-        raise InvalidArgumentError(
-            f"{material.elastic_place}: *ELASTIC of {material.name} gives no positive energy for some strains; "
-            "expected D1111, D1122, D2222, D1133, D2233, D3333, D1212, D1313, D2323 that do"
+        raise material.elastic_place.refused(
+            f"*ELASTIC of {material.name} gives no positive energy for some strains; expected D1111, D1122, D2222, "
+            "D1133, D2233, D3333, D1212, D1313, D2323 that do"
         )
     flexible = np.linalg.inv(moduli)
     young = 1 / np.diag(flexible)
@@ -107,15 +103,11 @@ def axes_of_section(deck: Deck, section: Section) -> list[float]:
     InvalidArgumentError
         It names no orientation, or one whose axes turn within an element.
     """
-    if section.orientation not in deck.orientations:
-        known = ", ".join(deck.orientations) or "none"
-        raise InvalidArgumentError(
-            f"{section.place}: *SOLID SECTION names the orientation {section.orientation}; expected one of {known}"
-        )
-    given = deck.orientations[section.orientation]
+    said = f"*SOLID SECTION names the orientation {section.orientation}"
+    given = section.place.entry(deck.orientations, section.orientation, said)
     if given.system != "RECTANGULAR":
-        raise InvalidArgumentError(
-            f"{given.place}: *ORIENTATION is {given.system.lower()}, with axes that turn within an element; expected "
+        raise given.place.refused(
+            f"*ORIENTATION is {given.system.lower()}, with axes that turn within an element; expected "
             "SYSTEM=RECTANGULAR for an orthotropic material"
         )
     first, second = given.points - given.origin
@@ -145,19 +137,12 @@ def elastic_sections(deck: Deck) -> list[tuple[Section, Integers]]:
         if not len(rows):
             continue
         if section.kind != "SOLID SECTION":
-            raise InvalidArgumentError(
-                f"{section.place}: *{section.kind} is of solid elements; expected *SOLID SECTION"
-            )
-        if section.material not in deck.materials:
-            known = ", ".join(deck.materials) or "none"
-            raise InvalidArgumentError(
-                f"{section.place}: *SOLID SECTION names the material {section.material}; expected one of {known}"
-            )
+            raise section.place.refused(f"*{section.kind} is of solid elements; expected *SOLID SECTION")
+        section.place.entry(deck.materials, section.material, f"*SOLID SECTION names the material {section.material}")
         if not np.all(without[rows]):
             again = deck.element_name(int(rows[np.argmin(without[rows])]))
-            raise InvalidArgumentError(
-                f"{section.place}: *SOLID SECTION holds element {again}, which has one already; expected one material "
-                "for every element"
+            raise section.place.refused(
+                f"*SOLID SECTION holds element {again}, which has one already; expected one material for every element"
             )
         found.append((section, rows))
         without[rows] = False
@@ -168,11 +153,6 @@ def elastic_sections(deck: Deck) -> list[tuple[Section, Integers]]:
             "SECTION; expected a material for every element"
         )
     return found
-
-
-def is_plane(deck: Deck) -> bool:
-    """True for a deck of plane elements."""
-    return deck.dimension == 2
 
 
 def _planes(deck: Deck, parts: DeckParts) -> Any:
@@ -190,29 +170,25 @@ def _planes(deck: Deck, parts: DeckParts) -> Any:
 
 def _check_contacts(deck: Deck, parts: DeckParts) -> None:
     """Refuse contacts between what there is not."""
-    said = deck.analysis
-    if not said.pairs:
+    if not deck.pairs:
         raise InvalidArgumentError(f"{deck.path} has no *CONTACT PAIR; expected contact")
-    for pair in said.pairs:
+    for pair in deck.pairs:
         for name in (pair.slave, pair.master):
             parts.check_surface(name, pair.place, "CONTACT PAIR", faced=name == pair.master)
-        if pair.interaction not in said.interactions:
-            raise InvalidArgumentError(
-                f"{pair.place}: *CONTACT PAIR names the interaction {pair.interaction or 'nothing'}; expected one of "
-                f"{', '.join(said.interactions) or 'none'}"
-            )
+        said = f"*CONTACT PAIR names the interaction {pair.interaction or 'nothing'}"
+        pair.place.entry(deck.interactions, pair.interaction, said)
         if isinstance(pair.adjust, str):
             deck.nodes_of(pair.adjust, pair.place)
     if not _touching(deck, 0):
-        raise InvalidArgumentError(f"{said.pairs[0].place}: all surfaces of *CONTACT PAIR are tied; expected contact")
+        raise deck.pairs[0].place.refused("all surfaces of *CONTACT PAIR are tied; expected contact")
 
 
 def _touching(deck: Deck, step: int) -> list[ContactPair]:
     """Pairs of surfaces that may touch in a step: not tied, and not taken out of contact by then."""
-    said, removed = deck.analysis, dict[tuple[str, str], bool]()
-    for own in said.steps[:step]:
+    removed: dict[tuple[str, str], bool] = {}
+    for own in deck.steps[:step]:
         removed |= {pair: not there for pair, there in own.contacts.items()}
-    apart = [pair for pair in said.pairs if not (pair.tied or said.interactions[pair.interaction].tied)]
+    apart = [pair for pair in deck.pairs if not (pair.tied or deck.interactions[pair.interaction].tied)]
     return [pair for pair in apart if not removed.get((pair.slave, pair.master), False)]
 
 
@@ -226,23 +202,23 @@ def contacts(deck: Deck, step: int) -> dict[str, Any]:
     """
     touching = _touching(deck, step)
     if not touching:
-        place = deck.analysis.steps[step - 1].place
-        raise InvalidArgumentError(f"{place}: no pair is in contact in step {step}; expected one, or --step")
+        place = deck.steps[step - 1].place
+        raise place.refused(f"no pair is in contact in step {step}; expected one, or --step")
     pairs = [(pair.slave, pair.master, *([] if pair.clearance is None else [pair.clearance])) for pair in touching]
     return {"pairs": pairs, "friction": _friction(deck, touching, step)}
 
 
 def _friction(deck: Deck, touching: list[ContactPair], step: int) -> dict[str, float]:
     """Coefficients of friction in a step, by surfaces."""
-    said, found = deck.analysis, dict[str, float]()
+    found: dict[str, float] = {}
     for pair in touching:
-        value = said.interactions[pair.interaction].friction
-        for own in said.steps[:step]:
+        value = deck.interactions[pair.interaction].friction
+        for own in deck.steps[:step]:
             value = own.friction.get(pair.interaction, value)
         if found.setdefault(pair.slave, value) != value:
-            raise InvalidArgumentError(
-                f"{pair.place}: the surface {pair.slave} has friction {value:g} here and {found[pair.slave]:g} in "
-                "another pair; expected one coefficient for each first surface"
+            raise pair.place.refused(
+                f"the surface {pair.slave} has friction {value:g} here and {found[pair.slave]:g} in another pair; "
+                "expected one coefficient for each first surface"
             )
     return found
 
@@ -303,9 +279,9 @@ def _on_nodes(
         if entry < 0 or (slot is None and number > dimension):
             if value:
                 what = "moves" if kind == "BOUNDARY" else "loads"
-                raise InvalidArgumentError(
-                    f"{place}: *{kind} {what} node {deck.node_name(row)} in component {number}; expected components "
-                    f"1 to {dimension}, or rotations of the reference node of a rigid body"
+                raise place.refused(
+                    f"*{kind} {what} node {deck.node_name(row)} in component {number}; expected components 1 to "
+                    f"{dimension}, or rotations of the reference node of a rigid body"
                 )
         elif slot is not None:
             points.setdefault(slot[0], {})[entry] = value
@@ -370,7 +346,7 @@ def _temperatures(deck: Deck, parts: DeckParts, state: DeckState) -> list[float]
 
 def _volume_forces(deck: Deck, parts: DeckParts, state: DeckState) -> dict[str, list[float]]:
     """Forces per volume by sets of elements: gravity by the density of each material, and those that are given."""
-    dimension = 2 if is_plane(deck) else 3
+    dimension = deck.dimension
     total: dict[int, Floats] = {}
     for _, axis, weight, rows in _by_mass(deck, state, "GRAV"):
         for row in rows:
@@ -404,8 +380,8 @@ def _by_mass(deck: Deck, state: DeckState, kind: str) -> Iterator[tuple[DeckPlac
             density = deck.materials[section.material].density
             own = np.intersect1d(rows, wanted)
             if len(own) and density is None:
-                raise InvalidArgumentError(
-                    f"{place}: *DLOAD has {kind} on elements of {section.material}, which has no *DENSITY; expected one"
+                raise place.refused(
+                    f"*DLOAD has {kind} on elements of {section.material}, which has no *DENSITY; expected one"
                 )
             numbers = np.array([float(part) for part in str(field).split()])
             yield place, numbers, value * (density or 0.0), own.tolist()
@@ -418,9 +394,9 @@ def _centrifugal(deck: Deck, parts: DeckParts, state: DeckState) -> dict[str, li
     for place, axis, force, rows in _by_mass(deck, state, "CENTRIF"):
         again = next((row for row in rows if row in turning), None)
         if again is not None:
-            raise InvalidArgumentError(
-                f"{place}: *DLOAD has CENTRIF on element {deck.element_name(again)}, as {turning[again]} has already; "
-                "expected one axis for every element"
+            raise place.refused(
+                f"*DLOAD has CENTRIF on element {deck.element_name(again)}, as {turning[again]} has already; expected "
+                "one axis for every element"
             )
         turning |= dict.fromkeys(rows, place)
         if rows:

@@ -7,35 +7,45 @@ TOML files and calls of `mesh_problem` share one builder. The steps become the l
 from __future__ import annotations
 
 import itertools
+import os
+import shutil
+import subprocess
 from collections.abc import Collection
-from dataclasses import dataclass, field
-from functools import cached_property
+from dataclasses import dataclass, field, replace
+from functools import cached_property, lru_cache
+from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+import scipy.sparse as sp
 
+from enumsol.decks.assembled import SLICES, read_calculix_stiffness
+from enumsol.decks.cards import continued
 from enumsol.decks.reading import described
 from enumsol.decks.states import states_of
 from enumsol.errors import InvalidArgumentError, InvalidProblemError
+from enumsol.fem.bodies import WITH_MODES
 from enumsol.fem.deck_joints import DeckJoints
-from enumsol.fem.deck_meshes import refuse_carriers
-from enumsol.fem.deck_options import acting, contacts, is_plane, shared
-from enumsol.fem.deck_parts import DeckParts
-from enumsol.fem.deck_stiffness import CODES, with_calculix
-from enumsol.fem.mesh_problems import mesh_scene
-from enumsol.fem.scene_steps import refuse_other
+from enumsol.fem.deck_options import acting, axes_of_section, contacts, elastic_sections, shared
+from enumsol.fem.deck_parts import DeckParts, refuse_carriers
+from enumsol.fem.mesh_files import mesh_of_deck
+from enumsol.fem.mesh_problems import mesh_scene, refuse_other
+from enumsol.fem.meshes import completing
+from enumsol.fem.restrained import Equation
+from enumsol.fem.scene_checks import scene_notes
 from enumsol.loading.steps import LoadStep
 from enumsol.support.arguments import file_path, one_of, positive_integer
-from enumsol.support.messages import counted
+from enumsol.support.messages import about, aligned, counted, shortened
 
 if TYPE_CHECKING:
-    import os
-
+    from enumsol.decks.assembled import AssembledStiffness
     from enumsol.decks.model import Deck
     from enumsol.decks.states import DeckState
     from enumsol.fem.meshes import PartedMesh
     from enumsol.fem.scenes import Scene
     from enumsol.model.problem3d import AnyProblem
+    from enumsol.support.array_types import Floats, Integers
 
 
 def read_deck(path: str | os.PathLike[str], *, ignore: Collection[str] = (), assemble: str | None = None) -> DeckModel:
@@ -157,12 +167,12 @@ class DeckModel:
         states = self._states()
         self._parts = DeckParts(self.deck)
         common = shared(self.deck, self._parts)
-        joints = DeckJoints(self.deck, self._parts, 2 if is_plane(self.deck) else 3)
+        joints = DeckJoints(self.deck, self._parts, self.deck.dimension)
         common |= joints.options
         self._options = [{**common, **acting(self.deck, self._parts, state, joints)} for state in states]
 
     def _states(self) -> list[DeckState]:
-        steps = self.deck.analysis.steps
+        steps = self.deck.steps
         if not steps:
             raise InvalidArgumentError(
                 f"{self.deck.path} has no *STEP; expected a deck with a step, or a bare mesh for enumsol solve, or "
@@ -176,21 +186,37 @@ class DeckModel:
     @property
     def step_count(self) -> int:
         """Number of its steps."""
-        return len(self.deck.analysis.steps)
+        return len(self.deck.steps)
 
     @property
     def times(self) -> list[float]:
         """The times at which its steps end, counted from the beginning of the first."""
-        return [*itertools.accumulate(step.period for step in self.deck.analysis.steps)]
+        return [*itertools.accumulate(step.period for step in self.deck.steps)]
 
     @cached_property
     def mesh(self) -> PartedMesh:
         """Mesh with the parts that the deck names, and those on which something acts; adjusted to its contacts."""
-        mesh = self._parts.mesh()
-        if all(pair.adjust is None for pair in self.deck.analysis.pairs):
+        mesh = self._parts.named_in(mesh_of_deck(self.deck))
+        if all(pair.adjust is None for pair in self.deck.pairs):
             return mesh
         options = {**self._at_nodes(mesh, self._options[0]), **contacts(self.deck, 0)}
-        return self._parts.adjusted(mesh_scene(mesh, **options))
+        return self._adjusted(mesh_scene(mesh, **options))
+
+    def _adjusted(self, scene: Scene) -> PartedMesh:
+        """Mesh whose contact nodes are moved onto what they face where the deck says so."""
+        points, rows = scene.mesh.points.copy(), scene.contacts.rows
+        adjusts = {(pair.slave, pair.master): pair.adjust for pair in self.deck.pairs}
+        for group, own in scene.contacts.by_group:
+            gaps, normals = scene.gaps[own], rows.normals[own]
+            adjust = None if group.pair is None else adjusts.get((group.pair.slave, group.pair.master))
+            if isinstance(adjust, str):
+                chosen = np.searchsorted(self._parts.used, self._parts.in_bodies(self.deck.node_sets[adjust]))
+                near = np.isin(rows.nodes[own], chosen) & (gaps != 0)
+            elif adjust is not None:
+                near = (gaps <= adjust) & (gaps != 0)
+            if adjust is not None:
+                points[rows.nodes[own][near]] += gaps[near, None] * normals[near]
+        return replace(scene.mesh, points=points)
 
     def scene(self, step: int | None = None) -> Scene:
         """Scene at the end of a step (from 1), reached from no load at once; of a deck with one step, that one.
@@ -204,10 +230,8 @@ class DeckModel:
         """
         number = self._number(step)
         if number not in self._scenes:
-            try:
+            with about(self.deck.path, InvalidArgumentError, made=InvalidProblemError):
                 self._scenes[number] = self._made({**self._options[number - 1], **contacts(self.deck, number)})
-            except InvalidArgumentError as error:
-                raise InvalidProblemError(f"{self.deck.path}: {error}") from error
         return self._scenes[number]
 
     def _made(self, options: dict[str, Any]) -> Scene:
@@ -232,10 +256,8 @@ class DeckModel:
             As `scene`, or the data of the problem are not admissible.
         """
         scene = self.scene(step)
-        try:
+        with about(self.deck.path, InvalidArgumentError, InvalidProblemError, made=InvalidProblemError):
             return scene.problem()
-        except (InvalidArgumentError, InvalidProblemError) as error:
-            raise InvalidProblemError(f"{self.deck.path}: {error}") from error
 
     def steps(self) -> list[LoadStep]:
         """Steps for `histories`, on the problem of any step.
@@ -247,7 +269,7 @@ class DeckModel:
         """
         first = self.problem(1)
         found = []
-        for number, step in enumerate(self.deck.analysis.steps, 1):
+        for number, step in enumerate(self.deck.steps, 1):
             other = self.problem(number)
             alone = f" (enumsol roots with --step {number} takes the step alone)"
             refuse_other(first, other, f"{step.place}: step {number}", alone)
@@ -281,10 +303,176 @@ def account_of(deck: Deck) -> str:
     for entry in deck.account:
         rows.setdefault((entry.place.file, entry.card, entry.became), []).append(entry.place.line)
     table = [(f"{file} {_lines(lines)}", f"*{card}", became) for (file, card, became), lines in rows.items()]
-    widths = [max((len(row[k]) for row in table), default=0) for k in (0, 1)]
-    return "\n".join(f"{place:{widths[0]}}  {card:{widths[1]}}  {became}" for place, card, became in table)
+    return "\n".join(aligned(table, left=2, free=True))
 
 
 def _lines(lines: list[int]) -> str:
     some = ", ".join(map(str, lines[:3]))
     return f"line{'s' if len(lines) > 1 else ''} {some}" + (f" and {len(lines) - 3} more" if len(lines) > 3 else "")
+
+
+# -- deck stiffness ----------------------------------------------------------------------------------------------------
+# Stiffness of the elements of a deck as CalculiX itself assembles it, in place of that of the package.
+#
+# CalculiX gets the elements, their sections and materials, and nothing that holds, joins or loads them: what acts on
+# the
+# bodies, what they touch and what joins them is the same with both stiffnesses.
+
+#: Codes that can assemble the stiffness of a deck: the commands that run them.
+CODES = ("ccx",)
+
+
+def with_calculix(scene: Scene, deck: Deck, used: Integers) -> Scene:
+    """The scene of a deck with the stiffness that CalculiX assembles.
+
+    Elements of 20 and of 15 nodes stay what they are: the nodes with which the mesh completes them move as the shape
+    functions of these elements have it. Of their facets the nodes between corners are in contact, for a uniform
+    pressure pulls at the corners.
+
+    Parameters
+    ----------
+    scene : Scene
+    deck : Deck
+    used : (k,) int array
+        Rows of the nodes in the deck that are the first k of the mesh.
+
+    Raises
+    ------
+    InvalidProblemError
+        CalculiX is not there or fails, or leaves displacements out that nothing holds; or temperatures vary, or act on
+        incompatible modes.
+    """
+    warm = scene.options.temperature
+    with_modes = any(name in WITH_MODES for name in scene.mesh.types)
+    if warm is not None and (with_modes or np.ptp(np.asarray(warm, dtype=np.float64)) > 0):
+        raise InvalidProblemError(
+            f"{deck.path}: temperatures act{' on elements with incompatible modes' if with_modes else ' that vary'}, "
+            "whose forces CalculiX does not write with the stiffness; expected one temperature of all nodes, without "
+            "such elements, or the deck without assemble"
+        )
+    points = deck.points.copy()
+    d = scene.dimension
+    points[used, :d] = scene.mesh.points[: len(used)]
+    found = run_calculix(_deck_of_elements(deck, points), str(deck.path), d == 2)
+    completed = _completed(scene, len(used))
+    contacts = scene.contacts.without(_on_completed_facets(scene, len(used)))
+    joints = replace(scene.joints, equations=[*completed, *scene.joints.equations])
+    other = replace(
+        scene, joints=joints, contacts=contacts, stiffness=_by_displacements(scene, deck, used, found), notes=[]
+    )
+    other.notes.extend(scene_notes(other))
+    return other
+
+
+@lru_cache(maxsize=1)  # the steps of a deck share it
+def run_calculix(text: str, name: str, plane: bool) -> AssembledStiffness:
+    """Stiffness that CalculiX writes for a deck with ``*FREQUENCY, SOLVER=MATRIXSTORAGE``.
+
+    Parameters
+    ----------
+    text : str
+    name : str
+        What messages call the deck.
+    plane : bool
+        As in `read_calculix_stiffness`.
+
+    Raises
+    ------
+    InvalidProblemError
+        It is not there, or fails; the message has the last lines of its output.
+    """
+    command = shutil.which(CODES[0])
+    if command is None:
+        raise InvalidProblemError(
+            f"{name}: there is no command {CODES[0]}; expected CalculiX to be installed, or the deck without assemble"
+        )
+    with TemporaryDirectory() as folder:
+        Path(folder, "elements.inp").write_text(text)
+        # with one thread sums do not depend on chance, and proofs can be checked on another run
+        alone = {**os.environ, "OMP_NUM_THREADS": "1"}
+        done = subprocess.run(
+            [command, "elements"], cwd=folder, env=alone, capture_output=True, text=True, errors="replace", check=False
+        )
+        if not Path(folder, "elements.dof").is_file() or not Path(folder, "elements.sti").is_file():
+            lines = [line.strip() for line in done.stdout.splitlines() if line.strip()]
+            errors = [k for k, line in enumerate(lines) if line.startswith("*ERROR")]
+            said = lines[errors[0] :][:4] if errors else lines[-4:]
+            raise InvalidProblemError(
+                f"{name}: CalculiX writes no stiffness ({shortened(' '.join(said)) or 'it says nothing'}); expected "
+                "elements and materials that it knows"
+            )
+        try:
+            return read_calculix_stiffness(Path(folder, "elements"), plane=plane)
+        except InvalidArgumentError as error:
+            raise InvalidProblemError(f"{name}: what CalculiX writes cannot be read ({error})") from error
+
+
+def _deck_of_elements(deck: Deck, points: Floats) -> str:
+    """A deck of the elements of bodies alone, whose nodes and elements have the numbers of their rows from 1."""
+    lines = ["*NODE", *(f"{row},{x!r},{y!r},{z!r}" for row, (x, y, z) in enumerate(points.tolist(), 1))]
+    first = 1
+    for block in deck.blocks:
+        if deck.is_body(block):
+            lines.append(f"*ELEMENT, TYPE={block.type.name}")
+            for number, nodes in enumerate((block.nodes + 1).tolist(), first):
+                lines += continued([str(number), *map(str, nodes)], 8)
+        first += len(block.labels)
+    for k, (section, rows) in enumerate(elastic_sections(deck)):
+        material = deck.materials[section.material]
+        law = {"ISO": "", "ORTHO": ", TYPE=ORTHO"}.get(material.elastic, ", TYPE=ENGINEERING CONSTANTS")
+        lines += [f"*ELSET, ELSET=E{k}", *(f"{row + 1}," for row in rows.tolist())]
+        lines += [f"*MATERIAL, NAME=M{k}", f"*ELASTIC{law}", *continued([*map(repr, material.constants.tolist())], 8)]
+        lines += ["*DENSITY", "1."]
+        turned = ""
+        if material.elastic != "ISO" and section.orientation:
+            turned = f", ORIENTATION=O{k}"
+            lines += [f"*ORIENTATION, NAME=O{k}", ",".join(map(repr, axes_of_section(deck, section)))]
+        lines.append(f"*SOLID SECTION, ELSET=E{k}, MATERIAL=M{k}{turned}")
+        if deck.dimension == 2:
+            lines.append(repr(section.thickness or 1.0))
+    return "\n".join([*lines, "*STEP", "*FREQUENCY, SOLVER=MATRIXSTORAGE", "1", "*END STEP", ""])
+
+
+def _by_displacements(scene: Scene, deck: Deck, used: Integers, found: AssembledStiffness) -> sp.csc_array:
+    """The stiffness by displacements of the scene, behind them those that only elements have.
+
+    These are along the thickness of plane stress, and of incompatible modes.
+    """
+    d, known = scene.dimension, scene.joints.references
+    nodes, directions = np.array(found.names).T - 1
+    own = (nodes >= 0) & (nodes < len(deck.points)) & (directions < d)
+    rows = np.searchsorted(used, nodes) * d + directions
+    inside = np.flatnonzero(~own)
+    rows[inside] = known.count + np.arange(len(inside))
+    there = np.zeros(known.count, dtype=bool)
+    there[rows[own]] = True
+    lost = np.flatnonzero(~there[: len(used) * d] & ~scene.held.fixed.ravel()[: len(used) * d])
+    if len(lost):
+        node = scene.mesh.node_names(lost[:1] // d)[0]
+        raise InvalidProblemError(
+            f"{deck.path}: CalculiX has no displacement {lost[0] % d + 1} of node {node}; expected all of nodes that "
+            "are not held"
+        )
+    A = found.A.tocoo()
+    factor = SLICES if scene.body.axisymmetric else 1.0
+    count = known.count + len(inside)
+    return sp.csc_array((factor * A.data, (rows[A.coords[0]], rows[A.coords[1]])), shape=(count, count))
+
+
+def _completed(scene: Scene, count: int) -> list[Equation]:
+    """Equations of the nodes from ``count`` on, which complete elements: they move as those around them let them."""
+    found: dict[int, Equation] = {}
+    for rows, shares in completing(3, scene.mesh.cells, count) if count < len(scene.mesh.points) else ():
+        for nodes, k in itertools.product(rows, range(3)):
+            own = Equation(3 * nodes + k, np.append(1.0, -shares), "the shape of an element")
+            found.setdefault(int(own.dofs[0]), own)
+    return list(found.values())
+
+
+def _on_completed_facets(scene: Scene, count: int) -> Integers:
+    """Nodes of contact facets with eight nodes that are not between corners."""
+    facets = scene.contacts.facets
+    if facets.shape[1] < 9:
+        return np.zeros(0, dtype=np.int64)
+    own = facets[facets[:, 8] >= count]
+    return np.setdiff1d(own[:, [0, 1, 2, 3, 8]], own[:, 4:8])

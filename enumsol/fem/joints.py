@@ -15,8 +15,9 @@ import scipy.sparse as sp
 
 from enumsol.errors import InvalidArgumentError
 from enumsol.fem.conditions import by_part, displacements_of, fix, frames_of, names_of
-from enumsol.fem.constraints import Equation, eliminated
 from enumsol.fem.contacts import PairOfParts, facing, facing_normals
+from enumsol.fem.restrained import Equation, eliminated
+from enumsol.model.mesh import assembled
 from enumsol.support.arguments import finite_number, shown
 from enumsol.support.array_arguments import short_vector
 
@@ -25,7 +26,7 @@ if TYPE_CHECKING:
     from enumsol.fem.conditions import Options
     from enumsol.fem.meshes import PartedMesh
     from enumsol.fem.restrained import Supports
-    from enumsol.support.array_types import Floats, Integers
+    from enumsol.support.array_types import Floats, Integers, NDArray
 
 #: Names of the components of a reference point, by dimension; those of nodes come first.
 COMPONENTS = {2: ("x", "y", "rz"), 3: ("x", "y", "z", "rx", "ry", "rz")}
@@ -403,12 +404,10 @@ def _node(mesh: PartedMesh, node: object, name: str) -> int:
 def _node_springs(mesh: PartedMesh, known: References, options: Options) -> sp.csc_array:
     """Stiffness of springs from each node of a part to the ground, or between two nodes."""
     frames, d = frames_of(mesh, options.transform), known.dimension
-    rows, columns, data = [], [], []
+    parts: list[tuple[Integers, Floats]] = []
 
-    def add(dofs: Integers, K: Any) -> None:
-        rows.append(np.repeat(dofs, len(dofs)))
-        columns.append(np.tile(dofs, len(dofs)))
-        data.append(K.ravel())
+    def add(dofs: Integers, K: NDArray[Any]) -> None:
+        parts.append((dofs[None], K[None]))
 
     for name, value in by_part(options.node_spring, "node_spring").items():
         ends = name.split(":") if name not in mesh.facets and name not in mesh.node_sets else [name]
@@ -430,10 +429,7 @@ def _node_springs(mesh: PartedMesh, known: References, options: Options) -> sp.c
         else:
             for node in mesh.nodes(name):
                 add(node * d + np.arange(d), frames.axes[node].T @ stiffness @ frames.axes[node])
-    if not data:
-        return sp.csc_array((known.count, known.count))
-    places = (np.concatenate(rows), np.concatenate(columns))
-    return sp.csc_array((np.concatenate(data), places), shape=(known.count, known.count))
+    return assembled(parts, known.count)
 
 
 def _stiffness(value: Any, name: str, count: int, axial: bool) -> Floats:

@@ -1,4 +1,4 @@
-"""Meshes of bodies from files of mesh generators, read by meshio, and from decks.
+"""Meshes of bodies from files of mesh generators, read by meshio, and from decks; several of them in one scene.
 
 By meshio's names of cells it is decided which of a file's cells are the body, and which are its facets.
 """
@@ -8,8 +8,9 @@ from __future__ import annotations
 import contextlib
 import io
 import os
+import re
 import warnings
-from collections.abc import Collection, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from pathlib import Path
 from types import MappingProxyType, ModuleType
 from typing import TYPE_CHECKING, Any, cast
@@ -17,15 +18,14 @@ from typing import TYPE_CHECKING, Any, cast
 import numpy as np
 
 from enumsol.errors import InvalidArgumentError, MissingDependencyError
-from enumsol.fem.cell_blocks import as_cells_have, joined
-from enumsol.fem.deck_meshes import DeckMesh, deck_mesh
-from enumsol.fem.file_counts import refuse_partial
-from enumsol.fem.meshes import ALL, SAME, PartedMesh, SolidMesh, positions
+from enumsol.fem.deck_parts import DeckMesh, deck_mesh
+from enumsol.fem.meshes import ALL, SAME, PartedMesh, SolidMesh, as_cells_have, joined, positions
 from enumsol.model.cells import KINDS, boundary_facets, by_kind, numbers_of_nodes, padded
 from enumsol.support.arguments import file_path, shown
+from enumsol.support.array_arguments import real_array, short_vector
 from enumsol.support.array_types import Floats, Integers, NDArray
 from enumsol.support.files import DAMAGE, unreadable
-from enumsol.support.messages import shortened
+from enumsol.support.messages import about, shortened
 
 if TYPE_CHECKING:
     import meshio
@@ -127,11 +127,9 @@ def _read(source: object, groups: str | None, dimension: int | None, ignore: Col
     place = file_path(source, "source", "the name of a file or a meshio.Mesh")
     if (found := unreadable(place)) is not None:
         raise InvalidArgumentError(f"{place}: {found}; expected a mesh that meshio reads")
-    try:
+    with about(place, InvalidArgumentError):
         mesh, said = _by_meshio(meshio, place)
         return _checked(mesh, groups, dimension, place, said)
-    except InvalidArgumentError as error:
-        raise InvalidArgumentError(f"{place}: {error}") from error
 
 
 def _by_meshio(meshio: ModuleType, place: Path) -> tuple[meshio.Mesh, str]:
@@ -160,10 +158,8 @@ def _of_deck(place: Path, groups: str | None, dimension: int | None, ignore: Col
     """Mesh of a deck, which has no cell data to group by."""
     from enumsol.decks.reading import described  # not for other files
 
-    try:
+    with about(place, InvalidArgumentError):
         return _parted(deck_mesh(described(place, ignore=ignore, bare=True), spelled=True), groups, dimension)
-    except InvalidArgumentError as error:
-        raise InvalidArgumentError(f"{place}: {error}") from error
 
 
 def mesh_of_deck(deck: Deck) -> PartedMesh:
@@ -422,3 +418,172 @@ def facets_of_sets(
     found = {name: outer[np.all(np.isin(outer, rows) | (outer >= count), axis=1)] for name, rows in sets.items()}
     whole = {name: np.union1d(rows, found[name]) if np.any(cells >= count) else rows for name, rows in sets.items()}
     return {name: rows for name, rows in found.items() if len(rows)}, whole
+
+
+# -- placing -----------------------------------------------------------------------------------------------------------
+# Several meshes in one scene, each placed where it belongs.
+
+#: What may be said of a mesh that is placed.
+_PLACING = {"mesh", "move", "turn"}
+
+
+def mesh_of(source: object, groups: str | None = None) -> PartedMesh:
+    """Mesh of what `mesh_problem` takes: a mesh, a file, or several by names, which begin the names of their parts.
+
+    Raises
+    ------
+    InvalidArgumentError
+        As `read_mesh`; or a mesh is not placed by ``move`` and ``turn``, or is plane beside one in 3D.
+    """
+    if isinstance(source, PartedMesh):
+        return source
+    if not isinstance(source, Mapping):
+        return read_mesh(source, groups)
+    if not len(source) or not all(isinstance(name, str) and name for name in source):
+        raise InvalidArgumentError(f"mesh is {shown(source)}; expected names with their meshes")
+    return _together({name: _placed(value, name, groups) for name, value in source.items()})
+
+
+def in_folder(source: object, folder: Path) -> Any:
+    """Description of a mesh by a file in this folder, with paths from the folder.
+
+    Raises
+    ------
+    InvalidArgumentError
+        It names no file.
+    """
+    if isinstance(source, Mapping):
+        return {
+            name: {**value, "mesh": in_folder(value.get("mesh"), folder)}
+            if isinstance(value, Mapping)
+            else in_folder(value, folder)
+            for name, value in source.items()
+        }
+    return folder / file_path(source, "mesh", "the name of a mesh file in quotes")
+
+
+def _placed(value: Any, name: str, groups: str | None) -> PartedMesh:
+    """A mesh that is turned about the origin, then moved."""
+    given = dict(value) if isinstance(value, Mapping) else {"mesh": value}
+    if "mesh" not in given or given.keys() - _PLACING:
+        raise InvalidArgumentError(f"mesh {name} is {shown(value)}; expected a mesh, and where wanted move and turn")
+    mesh = mesh_of(given["mesh"], groups)
+    d = mesh.points.shape[1]
+    move = short_vector(given["move"], f"move of {name}", d) if "move" in given else np.zeros(d)
+    points = mesh.points @ _rotation(given["turn"], name, d).T if "turn" in given else mesh.points
+    return type(mesh)(points + move, mesh.cells, mesh.facets, mesh.node_sets, mesh.bodies, None, mesh.types)
+
+
+def _rotation(value: object, name: str, dimension: int) -> Floats:
+    """The rotation by an angle in degrees, in 3D about an axis through the origin: [x, y, z, degrees]."""
+    numbers = np.atleast_1d(real_array(value, f"turn of {name}", error=InvalidArgumentError))
+    if numbers.shape != (1 if dimension == 2 else 4,) or (dimension == 3 and not np.any(numbers[:3])):
+        raise InvalidArgumentError(
+            f"turn of {name} is {shown(value)}; expected an angle in degrees, in 3D after the x, y, z of an axis"
+        )
+    quarters = numbers[-1] / 90.0
+    whole = quarters == np.round(quarters)  # exact where it can be
+    c, s = (np.round(f(np.pi / 2 * quarters)) if whole else f(np.radians(numbers[-1])) for f in (np.cos, np.sin))
+    if dimension == 2:
+        return np.array([[c, -s], [s, c]])
+    x, y, z = axis = numbers[:3] / np.linalg.norm(numbers[:3])
+    cross = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
+    return np.asarray(c * np.eye(3) + s * cross + (1 - c) * np.outer(axis, axis))
+
+
+def _together(meshes: Mapping[str, PartedMesh]) -> PartedMesh:
+    """Several meshes as one: names of parts begin with those of the meshes, which are parts of the body as well."""
+    dimensions = {mesh.points.shape[1] for mesh in meshes.values()}
+    if len(dimensions) > 1:
+        raise InvalidArgumentError("mesh has plane meshes and meshes in 3D; expected one or the other")
+    nodes = np.cumsum([0, *(len(mesh.points) for mesh in meshes.values())])
+    cells = np.cumsum([0, *(len(mesh.cells) for mesh in meshes.values())])
+
+    def named(which: str, starts: Integers) -> dict[str, Integers]:
+        return {
+            f"{name}.{part}": rows + first
+            for (name, mesh), first in zip(meshes.items(), starts[:-1], strict=True)
+            for part, rows in getattr(mesh, which).items()
+        }
+
+    whole = {name: np.arange(*cells[k : k + 2]) for k, name in enumerate(meshes)}
+    return (PartedMesh if dimensions == {2} else SolidMesh)(
+        np.concatenate([mesh.points for mesh in meshes.values()]),
+        padded([mesh.cells + first for mesh, first in zip(meshes.values(), nodes[:-1], strict=True)]),
+        named("facets", nodes),
+        named("node_sets", nodes),
+        {**whole, **named("bodies", cells)},
+        types=tuple(dict.fromkeys(kind for mesh in meshes.values() for kind in mesh.types)),
+    )
+
+
+# -- file counts -------------------------------------------------------------------------------------------------------
+# Contents of mesh files, counted without meshio and compared with what it read of them.
+#
+# Formats of lines of text are counted here, in which meshio passes over what it does not know.
+
+#: Cards of Nastran that are cells of bodies and facets; CTRIAX and the like are written with a longer name.
+_CARDS = ("CTRI", "CTRAX", "CQUAD", "CTETRA", "CHEXA", "CPENTA", "CPYRA", "CPLST", "CSHEAR")
+#: Messages of meshio about cells that it leaves out.
+_LEFT_OUT = re.compile(
+    r"meshio doesn't know (?:Gmf)?(?:Edges|Tri|Quad|Tetra|Hexa|Prism|Pyramid)\w*|could not parse line"
+    r"|\$(?:Nodes|Elements) not closed|End-of-file reached before"
+)
+
+
+def refuse_partial(place: Path, mesh: meshio.Mesh, said: str) -> None:
+    """Refuse an incomplete mesh that meshio read.
+
+    Parameters
+    ----------
+    place : Path
+    mesh : meshio.Mesh
+        Mesh that meshio read.
+    said : str
+        Text that meshio printed meanwhile.
+
+    Raises
+    ------
+    InvalidArgumentError
+        It left cells or nodes out.
+    """
+    if left := _LEFT_OUT.search(said):
+        raise InvalidArgumentError(
+            f"meshio left out a part of it ({left.group()}); expected a format that it reads whole, .msh or .vtu for "
+            "example"
+        )
+    counted = {".bdf": _nastran, ".fem": _nastran, ".nas": _nastran, ".msh": _gmsh}.get(place.suffix.lower())
+    found = counted(place) if counted is not None else {}
+    cells = sum(len(block.data) for block in mesh.cells if block.type not in ("vertex", "line"))
+    every = sum(len(block.data) for block in mesh.cells)
+    for what, read in (("nodes", len(mesh.points)), ("cells", every), ("cells of two or three dimensions", cells)):
+        if what in found and found[what] != read:
+            raise InvalidArgumentError(
+                f"meshio reads {read} of {found[what]} {what}; expected a file that it reads whole, .msh in version "
+                "4.1 or .vtu for example"
+            )
+
+
+def _nastran(place: Path) -> dict[str, int]:
+    """Cards of nodes and of cells."""
+    nodes = cells = 0
+    with place.open(encoding="utf-8", errors="replace") as file:
+        for line in file:
+            word = re.split(r"[,*\s]", line[:8].upper(), maxsplit=1)[0]
+            nodes += word == "GRID"
+            cells += word.startswith(_CARDS)
+    return {"nodes": nodes, "cells of two or three dimensions": cells}
+
+
+def _gmsh(place: Path) -> dict[str, int]:
+    """Numbers of nodes and cells that the sections of a text file announce; empty for a binary file."""
+    found: dict[str, int] = {}
+    with place.open("rb") as file:
+        if file.readline().strip() != b"$MeshFormat" or file.readline().split()[1:2] != [b"0"]:
+            return {}
+        for line in file:
+            section = {b"$Nodes": "nodes", b"$Elements": "cells"}.get(line.strip())
+            if section is not None:
+                numbers = next(file, b"0").split()  # in version 4 behind the number of blocks
+                found[section] = found.get(section, 0) + int(numbers[min(1, len(numbers) - 1)])
+    return found

@@ -1,4 +1,4 @@
-"""From a mesh with named parts to its scene and its contact problem, by a call or by a TOML file.
+"""From a mesh with named parts to its scene and its contact problem, by a call or by a TOML file, and steps of these.
 
 A body is of one material, or of one for each of its named parts.
 """
@@ -7,47 +7,49 @@ from __future__ import annotations
 
 import difflib
 import inspect
-from collections.abc import Callable, Mapping
-from dataclasses import replace
-from typing import TYPE_CHECKING, Any, Literal, TypeVar
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import fields, replace
+from typing import TYPE_CHECKING, Any, Concatenate, ParamSpec, TypeVar
 
+import numpy as np
 import scipy.sparse as sp
 
 from enumsol.errors import InvalidArgumentError, InvalidProblemError
 from enumsol.fem import conditions
 from enumsol.fem.bases import AXISYMMETRIC_DEGREE, nodal_basis
-from enumsol.fem.bodies import pieces_of
-from enumsol.fem.conditions import Options, refuse_old_friction
-from enumsol.fem.contacts import contacts_of
-from enumsol.fem.joints import joints_of
-from enumsol.fem.materials import (
+from enumsol.fem.bodies import (
     incompatible_of,
     is_axisymmetric,
     masses_of,
     material_of,
     nodes_on_axis,
+    pieces_of,
     thermal_forces,
     thickness_of,
 )
+from enumsol.fem.conditions import FRICTION, Options, is_pair, refuse_old_friction
+from enumsol.fem.contacts import contacts_of
+from enumsol.fem.joints import joints_of
+from enumsol.fem.mesh_files import in_folder, mesh_of
 from enumsol.fem.meshes import PartedMesh
-from enumsol.fem.placing import in_folder, mesh_of
 from enumsol.fem.scene_checks import refuse_overlaps, refuse_pairs, refuse_walls, scene_notes
 from enumsol.fem.scenes import Scene
-from enumsol.support.arguments import file_path, shown, text_of
+from enumsol.loading.steps import LoadStep
+from enumsol.support.arguments import alpha_value, file_path, shown, text_of
 from enumsol.support.files import unreadable
-from enumsol.support.messages import shortened
+from enumsol.support.messages import about, shortened
 from enumsol.support.plotting import checked_units
 from enumsol.support.saved import LARGEST_TOML, toml_from
 
 if TYPE_CHECKING:
     import os
-    from collections.abc import Sequence
     from pathlib import Path
 
-    from enumsol.fem.conditions import Names, Plane, Vectors
+    from enumsol.fem.conditions import Plane
     from enumsol.model.problem3d import AnyProblem
-    from enumsol.support.array_types import ArrayLike
+    from enumsol.support.array_types import Alpha, Floats
 
+P = ParamSpec("P")
 T = TypeVar("T")
 
 
@@ -112,56 +114,20 @@ def _plane(mesh: PartedMesh) -> Plane:
 _PAIRS = "contact_pair"
 
 
-def mesh_problem(
-    mesh: PartedMesh | str | os.PathLike[str] | Any,
-    *,
-    young: float | Mapping[str, float] | None = None,
-    poisson: float | Mapping[str, float] | None = None,
-    orthotropic: Sequence[float] | Mapping[str, Sequence[float]] | None = None,
-    orientation: Sequence[float] | Mapping[str, Sequence[float]] | None = None,
-    incompatible: bool | Names | None = None,
-    contact: Names = (),
-    pairs: Sequence[Sequence[Any]] = (),
-    plane: Plane | Mapping[str, Plane] | None = None,
-    thickness: float | Mapping[str, float] = 1.0,
-    expansion: float | Mapping[str, float] | None = None,
-    temperature: ArrayLike | Mapping[str, float] | None = None,
-    temperature_slope: ArrayLike | Mapping[str, float] | None = None,
-    density: float | Mapping[str, float] | None = None,
-    friction: float | Mapping[str, float] | None = None,
-    friction_slope: float | Mapping[str, float] | None = None,
-    friction2: float | Mapping[str, float] | None = None,
-    friction2_slope: float | Mapping[str, float] | None = None,
-    axis: ArrayLike | None = None,
-    clamp: Names = (),
-    symmetry: Names = (),
-    displacement: Mapping[str, Sequence[Any]] | None = None,
-    displacement_slope: Mapping[str, Sequence[Any]] | None = None,
-    transform: Mapping[str, Mapping[str, ArrayLike]] | None = None,
-    tie: Sequence[Sequence[Any]] = (),
-    reference: Vectors = None,
-    rigid: Mapping[str, Names] | None = None,
-    coupling: Mapping[str, Names] | None = None,
-    equations: Sequence[Mapping[str, Any]] = (),
-    spring: Vectors = None,
-    node_spring: Mapping[str, Any] | None = None,
-    load: Vectors = None,
-    load_slope: Vectors = None,
-    pressure: Mapping[str, float] | None = None,
-    pressure_slope: Mapping[str, float] | None = None,
-    body_force: ArrayLike | Mapping[str, ArrayLike] | None = None,
-    body_force_slope: ArrayLike | Mapping[str, ArrayLike] | None = None,
-    centrifugal: Mapping[str, ArrayLike] | None = None,
-    centrifugal_slope: Mapping[str, ArrayLike] | None = None,
-    force: Vectors = None,
-    force_slope: Vectors = None,
-    moment: Mapping[str, Any] | None = None,
-    moment_slope: Mapping[str, Any] | None = None,
-    gap: float | Mapping[str, float] = 0.0,
-    obstacle: Mapping[str, Sequence[float]] | None = None,
-    max_rigid_displacement: float | Literal["auto"] | None = None,
-    groups: str | None = None,
-) -> AnyProblem:
+def _taking(options: Callable[P, Options]) -> Callable[[Callable[..., T]], Callable[Concatenate[Any, P], T]]:
+    """A decorator: a function of a mesh takes these options, each by its name, in place of ``**options``."""
+
+    def decorated(made: Callable[..., T]) -> Callable[Concatenate[Any, P], T]:
+        signed = inspect.signature(made)
+        (mesh, _), named = signed.parameters.values(), inspect.signature(options).parameters.values()
+        made.__signature__ = signed.replace(parameters=[mesh, *named])  # type: ignore[attr-defined]
+        return made
+
+    return decorated
+
+
+@_taking(Options)
+def mesh_problem(mesh: PartedMesh | str | os.PathLike[str] | Any, **options: Any) -> AnyProblem:
     """Contact problem of a body whose mesh has named parts.
 
     `mesh_scene` describes in words and in a picture what the arguments stand for.
@@ -312,21 +278,7 @@ def mesh_problem(
     >>> problem.n, problem.p
     (24, 4)
     """
-    given = Options(
-        young=young, poisson=poisson, orthotropic=orthotropic, orientation=orientation,
-        incompatible=incompatible, contact=contact, pairs=pairs, plane=plane, thickness=thickness,
-        expansion=expansion, temperature=temperature, temperature_slope=temperature_slope, density=density,
-        friction=friction, friction_slope=friction_slope, friction2=friction2, friction2_slope=friction2_slope,
-        axis=axis, clamp=clamp, symmetry=symmetry, displacement=displacement,
-        displacement_slope=displacement_slope, transform=transform, tie=tie, reference=reference, rigid=rigid,
-        coupling=coupling, equations=equations, spring=spring, node_spring=node_spring,
-        load=load, load_slope=load_slope, pressure=pressure, pressure_slope=pressure_slope, body_force=body_force,
-        body_force_slope=body_force_slope, centrifugal=centrifugal,
-        centrifugal_slope=centrifugal_slope, force=force, force_slope=force_slope,
-        moment=moment, moment_slope=moment_slope,
-        gap=gap, obstacle=obstacle, max_rigid_displacement=max_rigid_displacement, groups=groups,
-    )  # fmt: skip
-    return scene_of(mesh, given).problem()
+    return scene_of(mesh, Options(**options)).problem()
 
 
 def mesh_scene(mesh: PartedMesh | str | os.PathLike[str] | Any, **options: Any) -> Scene:
@@ -364,13 +316,7 @@ def mesh_scene(mesh: PartedMesh | str | os.PathLike[str] | Any, **options: Any) 
     ...
     """
     check_keys(options)
-    return scene_of(mesh, Options(**(_defaults() | options)))
-
-
-def _defaults() -> dict[str, Any]:
-    """Options of `mesh_problem` with their defaults."""
-    known = inspect.signature(mesh_problem).parameters.items()
-    return {name: parameter.default for name, parameter in known if name != "mesh"}
+    return scene_of(mesh, Options(**options))
 
 
 def read_mesh_problem(path: str | os.PathLike[str]) -> AnyProblem:
@@ -424,7 +370,7 @@ def read_mesh_scene(path: str | os.PathLike[str]) -> Scene:
 
 def _of_file(path: object, made: Callable[[Scene], T]) -> T:
     place = file_path(path, "path")
-    try:
+    with about(place, InvalidArgumentError, InvalidProblemError, made=InvalidProblemError):
         options = _toml(place)
         given = in_folder(options.pop("mesh", None), place.parent)
         options.pop("steps", None)  # of enumsol history
@@ -434,8 +380,6 @@ def _of_file(path: object, made: Callable[[Scene], T]) -> T:
         written = "{0}.{1} = {2}".format, "{0} = {2}".format
         source = refuse_old_friction(given, options, lambda *said: written[not said[1]](*said))
         return made(mesh_scene(source, **options))
-    except (InvalidArgumentError, InvalidProblemError) as error:
-        raise InvalidProblemError(f"{place}: {error}") from error
 
 
 def _toml(place: Path) -> dict[str, Any]:
@@ -465,7 +409,7 @@ def check_keys(options: Mapping[str, Any], spelled: Callable[[str], str] = str, 
     InvalidArgumentError
         The closest name is given, or what is missing.
     """
-    known = _defaults()
+    known = [option.name for option in fields(Options)]
     for name in options:
         if name not in known:
             close = difflib.get_close_matches(name, [*known, *also], n=1)
@@ -477,3 +421,125 @@ def check_keys(options: Mapping[str, Any], spelled: Callable[[str], str] = str, 
     if missing:
         names = ", ".join(map(spelled, missing))
         raise InvalidArgumentError(f"{names} {'is' if len(missing) == 1 else 'are'} missing")
+
+
+# -- scene steps -------------------------------------------------------------------------------------------------------
+# Steps of a history of a scene: each gives some of the loads of `mesh_problem` anew.
+
+#: Options that a step may give anew.
+_LOADS = (
+    "displacement",
+    "temperature",
+    *(
+        name + end
+        for name in ("load", "pressure", "body_force", "centrifugal", "force", "moment")
+        for end in ("", "_slope")
+    ),
+)
+
+
+def scene_steps(scene: Scene, steps: Iterable[Mapping[str, Any]]) -> list[LoadStep]:
+    """Steps for `histories` on the problem of a scene, each by what it gives anew, as ``[[steps]]`` in a TOML file.
+
+    A step does not build on the step before: what it does not give is as in the scene. By names of parts, it gives
+    values of those that it names.
+
+    Parameters
+    ----------
+    scene : Scene
+    steps : sequence of mappings
+        Any of ``alpha``; ``friction``, as in `LoadStep`, in 3D also as a pair along both axes, or by names of all
+        contact parts; ``displacement`` of nodes without contact that the scene holds; and, as in `mesh_problem`,
+        ``temperature``, ``load``, ``pressure``, ``body_force``, ``centrifugal``, ``force`` and ``moment``, the last six
+        also with ``_slope``.
+
+    Returns
+    -------
+    list of LoadStep
+        With loads, if a step gives any.
+
+    Raises
+    ------
+    InvalidArgumentError
+        A step is not of that form, or lacks the alpha on which its load depends; or another code made the stiffness.
+    InvalidProblemError
+        A step changes more than loads, displacements of nodes without contact, and friction.
+
+    Examples
+    --------
+    >>> import enumsol
+    >>> from enumsol import fem
+    >>> scene = fem.mesh_scene(
+    ...     fem.rectangle(2, 2).parted(), young=2.5, poisson=0.25, contact="bottom", clamp="left", friction=0.5
+    ... )
+    >>> steps = fem.scene_steps(scene, [{"pressure": {"top": 1}}, {"pressure": {"top": 1}, "force": {"right": (1, 0)}}])
+    >>> enumsol.histories(scene.problem(), steps).counts
+    (1, 1)
+    """
+    tables = list(steps)
+    if scene.stiffness is not None:
+        raise InvalidArgumentError("the stiffness of the scene is of another code; expected its steps in the deck")
+    for number, table in enumerate(tables, 1):
+        _check(number, table)
+    first, loaded = scene.problem(), any(table.keys() & {*_LOADS} for table in tables)
+    return [_step(scene, first, number, table, loaded) for number, table in enumerate(tables, 1)]
+
+
+def refuse_other(first: AnyProblem, other: AnyProblem, step: str, instead: str = "") -> None:
+    """Refuse a step to a problem that differs from the first by more than its load and friction.
+
+    Raises
+    ------
+    InvalidProblemError
+        The sentence begins with ``step`` and says what differs.
+    """
+    what = _differs(first, other)
+    if what is not None:
+        raise InvalidProblemError(
+            f"{step} changes {what}; expected steps that change loads, friction and displacements of nodes without "
+            f"contact{instead}"
+        )
+
+
+def _check(number: int, table: object) -> None:
+    known = ("alpha", "friction", *_LOADS)
+    if not isinstance(table, Mapping):
+        raise InvalidArgumentError(f"step {number} is {shown(table)}; expected some of {', '.join(known)}")
+    unknown = [str(name) for name in table if name not in known]
+    if unknown:
+        raise InvalidArgumentError(f"step {number} has {', '.join(unknown)}; expected some of {', '.join(known)}")
+
+
+def _step(scene: Scene, first: AnyProblem, number: int, table: Mapping[str, Any], loaded: bool) -> LoadStep:
+    options, friction = scene.options, table.get("friction")
+    given: dict[str, Any] = {name: _given(getattr(options, name), table[name]) for name in _LOADS if name in table}
+    along = isinstance(friction, Mapping) or (scene.dimension == 3 and is_pair(friction))
+    if along:
+        given |= {**dict.fromkeys(FRICTION), "friction": friction}
+    with about(f"step {number}", InvalidArgumentError, InvalidProblemError):
+        alpha = alpha_value(table["alpha"]) if "alpha" in table else None
+        problem = scene_of(scene.mesh, replace(options, **given)).problem() if given else first
+        refuse_other(first, problem, "it")
+        return LoadStep(alpha, problem.friction if along else friction, _load(problem, alpha) if loaded else None)
+
+
+def _load(problem: AnyProblem, alpha: Alpha | None) -> Floats:
+    if alpha is None and problem.load_slope is not None:
+        raise InvalidArgumentError("it has no alpha, on which its load depends; expected one")
+    return problem.load_at(0 if alpha is None else alpha)
+
+
+def _given(own: object, value: object) -> object:
+    """An option of a scene with what a step says of it: of the parts that it names, or as a whole."""
+    return {**own, **value} if isinstance(own, Mapping) and isinstance(value, Mapping) else value
+
+
+def _differs(first: AnyProblem, other: AnyProblem) -> str | None:
+    """Data that two problems do not share but for load and friction, in words."""
+    if first.p != other.p or (first.n == other.n and (first.Bn != other.Bn).nnz):
+        return "which pairs are in contact, or what is held"
+    if first.n != other.n or (first.A != other.A).nnz:
+        return "what is held"
+    if np.any(first.gap != other.gap) or np.any(first.slip_offset != other.slip_offset):
+        return "the displacement of nodes that are in contact or faced by such"
+    return None

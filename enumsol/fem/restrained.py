@@ -8,6 +8,7 @@ leave one degree of freedom that is alpha. All builders of contact problems in 2
 
 from __future__ import annotations
 
+from collections import defaultdict
 from dataclasses import dataclass, field, replace
 from itertools import combinations
 from typing import TYPE_CHECKING, Any
@@ -16,7 +17,6 @@ import numpy as np
 import scipy.sparse as sp
 
 from enumsol.errors import InvalidArgumentError
-from enumsol.fem.constraints import eliminated, followed
 from enumsol.fem.meshes import nodal_vectors, spring_stiffnesses, unit_vectors, vectors_of_all
 from enumsol.model.problem import ContactProblem
 from enumsol.support.arguments import shown
@@ -24,14 +24,13 @@ from enumsol.support.arguments import shown
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
 
-    from enumsol.fem.constraints import Elimination, Equation
     from enumsol.model.mesh import BodyMesh
     from enumsol.model.problem3d import AnyProblem
     from enumsol.support.array_types import ArrayLike, Floats, Integers, Mask
 
     Tangents = ArrayLike | tuple[ArrayLike, ArrayLike] | None
 
-#: Components of unit normals below this are rounding of a right angle.
+#: Components of unit vectors below this are rounding of a right angle, and so are moduli beside the largest.
 RIGHT_ANGLE = 1e-9
 #: Contact rows depend on each other if the least of their squared singular values is below this share of the largest.
 _DEPENDENT = 1e-12
@@ -387,3 +386,195 @@ def default_axes(normal: Floats) -> tuple[Floats, Floats]:
     start = np.where(np.abs(normal[:, :1]) > 0.9, [[0.0, 1.0, 0.0]], [[1.0, 0.0, 0.0]])
     first = unit_vectors(start - np.sum(start * normal, axis=1)[:, None] * normal, "axes")
     return first, np.cross(normal, first)
+
+
+# -- constraints -------------------------------------------------------------------------------------------------------
+# Linear equations between displacements, solved for some of them, which are thereby eliminated (theory, section 11.9).
+#
+# Supports are such equations, with one displacement each; so are ties, rigid parts and rollers in oblique planes.
+
+#: Coefficients and right sides below this share of what they are the difference of are rounding. Larger, equations that
+#: differ would count as one; smaller, repeated ones as a contradiction.
+_ROUNDED = 1e-10
+#: An equation is solved for its first displacement unless its coefficient is below this share of the largest.
+_SMALL = 0.1
+
+
+@dataclass(frozen=True)
+class Equation:
+    """The equation: the sum of coefficients times displacements is value + alpha slope.
+
+    Attributes
+    ----------
+    dofs : (k,) int array
+        Degrees of freedom; it is solved for the first if its coefficient is not small.
+    coefficients : (k,) array
+    name : str
+        What messages call it.
+    value, slope : float
+        [length].
+    """
+
+    dofs: Integers
+    coefficients: Floats
+    name: str
+    value: float = 0.0
+    slope: float = 0.0
+
+
+@dataclass(frozen=True)
+class Elimination:
+    """Displacements x = T q + offset + alpha slope, where q are those that are left, in their order.
+
+    Attributes
+    ----------
+    left : (n,) int array
+    T : (m, n) csr_array
+        Its rows ``left`` are those of the identity.
+    offset, slope : (m,) arrays
+        [length].
+    """
+
+    left: Integers
+    T: sp.csr_array
+    offset: Floats
+    slope: Floats
+
+
+@dataclass
+class _Row:
+    """A displacement in terms of others: ``value + alpha slope`` plus ``terms``; of sums, what they are made of.
+
+    ``size`` is the largest of what value and slope are sums of.
+    """
+
+    terms: dict[int, float]
+    value: float
+    slope: float
+    size: tuple[float, float] = (0.0, 0.0)
+
+    def __post_init__(self) -> None:
+        self.size = max(self.size[0], abs(self.value)), max(self.size[1], abs(self.slope))
+
+    def put_in(self, dof: int, other: _Row) -> None:
+        """Put another row in for a displacement."""
+        factor = self.terms.pop(dof)
+        for own, coefficient in other.terms.items():
+            total = self.terms.get(own, 0.0) + factor * coefficient
+            if abs(total) <= _ROUNDED * abs(factor * coefficient):
+                self.terms.pop(own, None)
+            else:
+                self.terms[own] = total
+        self.value += factor * other.value
+        self.slope += factor * other.slope
+        self.size = max(self.size[0], abs(factor) * other.size[0]), max(self.size[1], abs(factor) * other.size[1])
+
+
+def eliminated(
+    fixed: Mask,
+    values: Floats,
+    slopes: Floats,
+    equations: Sequence[Equation] = (),
+    apart: Mask | None = None,
+    named: Callable[[int], str] = "displacement {}".format,
+) -> Elimination:
+    """Elimination of what is fixed, and of one displacement for each of the equations.
+
+    Parameters
+    ----------
+    fixed : (m,) bool array
+        Displacements that are given: values + alpha slopes.
+    values, slopes : (m,) arrays
+        0 where nothing is fixed [length].
+    equations : sequence of Equation
+    apart : (m,) bool array or None
+        Fixed displacements that are left nevertheless, alone.
+    named : callable
+        The name of a displacement in messages.
+
+    Raises
+    ------
+    InvalidArgumentError
+        An equation contradicts others; it names both.
+    """
+    count = len(fixed)
+    rows = _solved(fixed, values, slopes, equations, named)
+    gone = fixed if apart is None else fixed & ~apart
+    solved = np.fromiter(rows, dtype=np.int64, count=len(rows))
+    left = np.flatnonzero(~gone)
+    offset, slope = np.where(fixed, values, 0.0), np.where(fixed, slopes, 0.0)
+    if len(solved):
+        left = np.setdiff1d(left, solved, assume_unique=True)
+        offset[solved] = [row.value for row in rows.values()]
+        slope[solved] = [row.slope for row in rows.values()]
+    column = np.full(count, -1)
+    column[left] = np.arange(len(left))
+    lengths = [len(row.terms) for row in rows.values()]
+    others = np.array([dof for row in rows.values() for dof in row.terms], dtype=np.int64)
+    data = np.array([value for row in rows.values() for value in row.terms.values()])
+    places = (np.concatenate([left, np.repeat(solved, lengths)]), column[np.concatenate([left, others])])
+    T = sp.csr_array((np.concatenate([np.ones(len(left)), data]), places), shape=(count, len(left)))
+    return Elimination(left, T, offset, slope)
+
+
+def _solved(
+    fixed: Mask, values: Floats, slopes: Floats, equations: Sequence[Equation], named: Callable[[int], str]
+) -> dict[int, _Row]:
+    """A row for each displacement that an equation is solved for, in those that are left."""
+    rows: dict[int, _Row] = {}
+    users: defaultdict[int, set[int]] = defaultdict(set)
+    for equation in equations:
+        own = _Row({}, -equation.value, -equation.slope)
+        largest = float(np.max(np.abs(equation.coefficients)))
+        for dof, coefficient in zip(equation.dofs.tolist(), equation.coefficients.tolist(), strict=True):
+            known = _Row({}, values[dof], slopes[dof]) if fixed[dof] else rows.get(dof, _Row({dof: 1.0}, 0.0, 0.0))
+            own.terms[-1] = coefficient  # no displacement has this number
+            own.put_in(-1, known)
+        terms = {dof: value for dof, value in own.terms.items() if abs(value) > _ROUNDED * largest}
+        if not terms:
+            if abs(own.value) > _ROUNDED * own.size[0] or abs(own.slope) > _ROUNDED * own.size[1]:
+                of = ", ".join(dict.fromkeys(named(dof) for dof in equation.dofs.tolist()[:4]))
+                raise InvalidArgumentError(
+                    f"{equation.name} contradicts what supports and other equations give for {of}; expected equations "
+                    "that hold together"
+                )
+            continue
+        most = _SMALL * max(map(abs, terms.values()))
+        pivot = next(dof for dof, value in terms.items() if abs(value) >= most)
+        factor = -terms.pop(pivot)
+        size = own.size[0] / abs(factor), own.size[1] / abs(factor)
+        row = _Row({dof: value / factor for dof, value in terms.items()}, own.value / factor, own.slope / factor, size)
+        for user in users.pop(pivot, ()):
+            if pivot in rows[user].terms:
+                rows[user].put_in(pivot, row)
+                for dof in row.terms:
+                    users[dof].add(user)
+        rows[pivot] = row
+        for dof in terms:
+            users[dof].add(pivot)
+    return rows
+
+
+def followed(T: sp.csr_array, slope: Floats, rows: sp.csr_array) -> Floats:
+    """Displacement that contains ``slope`` and does not move contact rows: slope - T d with rows (slope - T d) = 0.
+
+    Raises
+    ------
+    InvalidArgumentError
+        Contact rows move that nothing free can follow.
+    """
+    moved = np.asarray(rows @ slope)
+    if not np.any(moved):
+        return slope
+    own = sp.csr_array(rows @ T)
+    free = np.asarray(abs(own).sum(axis=1)).ravel() > 0
+    if np.any(moved[~free]):
+        raise InvalidArgumentError(
+            "displacement_slope moves contact nodes in a direction in which nothing can follow them; expected nodes "
+            "that contact does not need"
+        )
+    own = sp.csr_array(own[np.flatnonzero(free)])
+    from scipy.sparse.linalg import spsolve  # scipy's solvers come with it
+
+    force: Any = spsolve(sp.csc_array(own @ own.T), moved[free])
+    return np.asarray(slope - T @ (own.T @ np.atleast_1d(force)))

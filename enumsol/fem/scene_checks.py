@@ -10,9 +10,8 @@ import scipy.sparse as sp
 from enumsol.decks.elements import element_type
 from enumsol.errors import InvalidArgumentError
 from enumsol.fem.bases import SIMPLICES, corners_of, place_of
-from enumsol.fem.bodies import holding
+from enumsol.fem.bodies import WITH_MODES, holding
 from enumsol.fem.contacts import Group, faced
-from enumsol.fem.materials import WITH_MODES
 from enumsol.fem.meshes import SAME, PartedMesh, cell_name, unit_vectors
 from enumsol.fem.scenes import Scene
 from enumsol.model.cells import boundary_facets
@@ -134,9 +133,7 @@ def refuse_pairs(scene: Scene) -> None:
     mesh, rows = scene.mesh, scene.contacts.rows
     places = rows.means @ mesh.points
     body = _bodies(scene)
-    first = 0
-    for group in scene.contacts.groups:
-        own, first = np.arange(first, first + group.count), first + group.count
+    for group, own in scene.contacts.by_group:
         if group.pair is None:
             continue
         facets = mesh.part(group.pair.master)
@@ -239,12 +236,11 @@ def _nodes_of(mesh: PartedMesh, group: Group) -> Mask:
 
 def _turning(scene: Scene) -> list[str]:
     """Notes on pairs of a body that could roll, whose normals turn along the contact more than what they face does."""
-    mesh, notes, first = scene.mesh, [], 0
+    mesh, notes = scene.mesh, []
     hold = holding(scene.held, sp.csc_array(scene.springs.shape), scene.joints.rows)
     loose = np.any([piece.nodes for piece in scene.moving if piece.free_motions(mesh.points, hold)], axis=0)
-    for group in scene.contacts.groups:
-        rows, first = scene.contacts.rows.means[first : first + group.count], first + group.count
-        pair = group.pair
+    for group, own in scene.contacts.by_group:
+        rows, pair = scene.contacts.rows.means[own], group.pair
         if pair is None or not np.any(loose & _nodes_of(mesh, group)):
             continue
         outward = scene.body.on_part(mesh.part(pair.master), pair.master, np.asarray)

@@ -19,12 +19,11 @@ from enumsol.fem.contacts import Contacts, Group
 from enumsol.fem.joints import Joints, resized
 from enumsol.fem.meshes import PartedMesh, unit_vectors
 from enumsol.fem.restrained import Body, Supports, axes_of, problem_of
-from enumsol.model.cells import KINDS, boundary_facets, by_kind, facet_outlines, facet_rows, lines_along
-from enumsol.model.mass import consistent_mass
-from enumsol.model.mesh import BodyMesh
+from enumsol.model.cells import KINDS, boundary_facets, by_kind, edges_of, facet_outlines, facet_rows, lines_along
+from enumsol.model.mesh import BodyMesh, consistent_mass
 from enumsol.model.problem import given_friction
 from enumsol.model.restart import afresh
-from enumsol.model.shapes import acting_nodes, signs
+from enumsol.model.shapes import acting_nodes, arrow_scale, signs
 from enumsol.support.arguments import finite_number, positive_number, shown
 from enumsol.support.array_arguments import short_vector
 from enumsol.support.array_types import Floats, Integers
@@ -37,8 +36,8 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
+    from enumsol.fem.bodies import BodyMaterial
     from enumsol.fem.conditions import Coefficients
-    from enumsol.fem.materials import BodyMaterial
     from enumsol.fem.restrained import ContactRows
     from enumsol.model.problem3d import AnyProblem
 
@@ -141,8 +140,7 @@ class Scene:
     @property
     def gaps_of_groups(self) -> list[tuple[Group, Floats]]:
         """The groups of contact nodes, each with the gaps of its own."""
-        groups = self.contacts.groups
-        return list(zip(groups, np.split(self.gaps, np.cumsum([group.count for group in groups])[:-1]), strict=True))
+        return [(group, self.gaps[own]) for group, own in self.contacts.by_group]
 
     @cached_property
     def hold(self) -> sp.csc_array:
@@ -446,8 +444,6 @@ def _vector(values: Floats) -> str:
     return f"({', '.join(f'{float(value) + 0.0:.6g}' for value in values)})"
 
 
-#: Length of the longest force, and of a normal, as a part of the extent.
-_FORCE, _NORMAL = 0.16, 0.06
 _BODY, _EDGE, _LOAD, _SLOPE, _CONTACT = "#dfe6ee", "#aab6c3", "#b3202c", "#d9730d", "#1f5fa8"
 
 
@@ -476,12 +472,12 @@ def _drawn(scene: Scene, units: tuple[str, str] | None = None) -> Figure:
     places = mesh.points[scene.contacts.rows.nodes]
     extent = float(np.max(np.ptp(mesh.points, axis=0)))
     ax.plot(*places.T, "o", color=_CONTACT, markersize=4, label="contact nodes and their normals", zorder=5)
-    _arrows(ax, places, _NORMAL * extent * scene.contacts.rows.normals, _CONTACT)
+    _arrows(ax, places, 0.06 * extent * scene.contacts.rows.normals, _CONTACT)
     for forces, colour, label in ((scene.forces, _LOAD, "loads"), (scene.slope, _SLOPE, "loads times alpha")):
         shown = signs(mesh.points, acting_nodes(forces), _edges(d, mesh.cells))
         if shown:
             sums = np.array([forces[group].sum(axis=0) for _, group in shown])
-            long = _FORCE * extent / np.max(np.linalg.norm(sums, axis=1)) * sums
+            long = arrow_scale(np.max(np.linalg.norm(sums, axis=1)), extent) * sums
             some = ", summed over nodes side by side" if any(len(group) > 1 for _, group in shown) else ""
             _arrows(ax, mesh.points[[node for node, _ in shown]] - long, long, colour, label + some)
     if d == 2:
@@ -501,8 +497,7 @@ def _edges(dimension: int, cells: Integers) -> Integers:
     """Edges of the boundary between neighbouring nodes, (k, 2)."""
     facets = boundary_facets(dimension, cells)
     if dimension == 3:
-        outlines = facet_outlines(facets)
-        return np.stack([outlines, np.roll(outlines, -1, axis=1)], axis=2).reshape(-1, 2)
+        return edges_of(facet_outlines(facets))
     along = lines_along(facets)
     return np.concatenate([along[:, k : k + 2] for k in range(along.shape[1] - 1)])
 

@@ -228,7 +228,7 @@ class FixedPoint(TrescaState):
             "rounding": repr(self.rounding),
             "period": self.period,
             "node_ids": [str(label) for label in self.problem.node_ids],
-            "statuses": [status.value for status in self.statuses],
+            "statuses": self.statuses,
         }
         arrays = {name: getattr(self, name) for name in (*_names(self.problem), "u")}
         arrays = {name: np.zeros(0) if array is None else array for name, array in arrays.items()}

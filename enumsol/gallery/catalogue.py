@@ -7,19 +7,7 @@ from functools import partial
 from types import MappingProxyType
 from typing import TYPE_CHECKING
 
-from enumsol.gallery.machine_parts import brake_shoe, clip, dovetail, lap_joint, pressed_rings
-from enumsol.gallery.problems import (
-    block3d,
-    block_on_table,
-    chain,
-    clamped_block,
-    one_node_3d,
-    one_node_triangle,
-    taper,
-    two_node_square,
-    wedge,
-    wedge3d,
-)
+from enumsol.gallery import machine_parts as parts, problems
 from enumsol.support import arguments
 
 if TYPE_CHECKING:
@@ -89,15 +77,15 @@ def close_names(name: str) -> list[str]:
 
 def _small() -> Iterator[GalleryEntry]:
     def one(name: str, summary: str, alpha: float, roots: int | None, f: Pair) -> GalleryEntry:
-        return GalleryEntry(f"one-node-{name}", summary, alpha, roots, partial(one_node_triangle, f))
+        return GalleryEntry(f"one-node-{name}", summary, alpha, roots, partial(problems.one_node_triangle, f))
 
     def two(name: str, summary: str, alpha: float, roots: int, loads: tuple[Pair, Pair]) -> GalleryEntry:
-        build = partial(two_node_square, *loads)
+        build = partial(problems.two_node_square, *loads)
         return GalleryEntry(f"two-node-{name}", f"own geometry, {summary}", alpha, roots, build)
 
     def path(name: str, sign: float, alpha: float) -> GalleryEntry:
         slope = ((0.1, sign * 1.1), (0.2, sign * 0.8))
-        build = partial(two_node_square, (0.4, 0.2), (1.8, -0.1), friction=4.0, load_slope=slope)
+        build = partial(problems.two_node_square, (0.4, 0.2), (1.8, -0.1), friction=4.0, load_slope=slope)
         summary = f"own geometry, loading path of Example 6.7, tangential slopes {sign * 1.1:+g} and {sign * 0.8:+g}"
         return GalleryEntry(f"two-node-6.7-{name}", summary, alpha, 3, build)
 
@@ -115,53 +103,61 @@ def _small() -> Iterator[GalleryEntry]:
 
 def _large() -> Iterator[GalleryEntry]:
     for p in (8, 16, 32, 64, 100):
-        build = partial(clamped_block, p, p // 2)
+        build = partial(problems.clamped_block, p, p // 2)
         yield GalleryEntry(f"clamped-block-{p}", f"block on {p} contact nodes: one root", 3.0, 1, build)
-    yield GalleryEntry("block-on-table-5", "block that nothing but contact holds: one root", 0.0, 1, block_on_table)
+    yield GalleryEntry(
+        "block-on-table-5", "block that nothing but contact holds: one root", 0.0, 1, problems.block_on_table
+    )
     for p in (8, 14, 20, 32):
-        build = partial(wedge, 4, p // 2)
+        build = partial(problems.wedge, 4, p // 2)
         yield GalleryEntry(f"wedge-{p}-3", "wedge pulled straight: jammed, free or sliding out", 1.0, 3, build)
     # at each of these alpha the five roots are well away from changes of status
     for p, alpha in ((8, 3.0), (14, 2.2), (20, 2.25), (32, 2.2)):
-        build = partial(wedge, 4, p // 2, (4e-4, 1e-3))
+        build = partial(problems.wedge, 4, p // 2, (4e-4, 1e-3))
         yield GalleryEntry(f"wedge-{p}-5", "wedge pulled obliquely: it may hang tilted too", alpha, 5, build)
     for p in (8, 14):
-        build = partial(taper, 4, p // 2)
+        build = partial(problems.taper, 4, p // 2)
         yield GalleryEntry(
             f"taper-{p}", "self-holding taper of steel, pulled: it holds, slides or is free", 0.2, 3, build
         )
     for p in (2, 4, 6, 8):
-        yield GalleryEntry(f"chain-{p}", f"{p} separate one-node triangles: 3^{p} roots", 5.0, 3**p, partial(chain, p))
+        yield GalleryEntry(
+            f"chain-{p}", f"{p} separate one-node triangles: 3^{p} roots", 5.0, 3**p, partial(problems.chain, p)
+        )
     for p in (2, 4, 6, 8):
-        build = partial(chain, p, 0.05)
+        build = partial(problems.chain, p, 0.05)
         yield GalleryEntry(f"chain-{p}-coupled", f"{p} one-node triangles joined by weak springs", 5.0, 3**p, build)
 
 
 def _machine_parts() -> Iterator[GalleryEntry]:
-    yield GalleryEntry("dovetail-14", "dovetail root of a blade, pulled into its slot: one root", 0.2, 1, dovetail)
     yield GalleryEntry(
-        "brake-shoe-9", "brake shoe, pulled off: it is released, or locked by the drum", 0.4, 3, brake_shoe
+        "dovetail-14", "dovetail root of a blade, pulled into its slot: one root", 0.2, 1, parts.dovetail
     )
-    yield GalleryEntry("clip-17", "clip on a round bar, pulled off: it grips, or has sprung off", 0.25, 3, clip)
     yield GalleryEntry(
-        "pressed-rings-16", "two rings with a press fit that transmits a torque: one root", 0.15, 1, pressed_rings
+        "brake-shoe-9", "brake shoe, pulled off: it is released, or locked by the drum", 0.4, 3, parts.brake_shoe
     )
-    yield GalleryEntry("lap-joint-9", "lap joint of two plates, stretched: its ends slip, one root", 0.3, 1, lap_joint)
+    yield GalleryEntry("clip-17", "clip on a round bar, pulled off: it grips, or has sprung off", 0.25, 3, parts.clip)
+    yield GalleryEntry(
+        "pressed-rings-16", "two rings with a press fit that transmits a torque: one root", 0.15, 1, parts.pressed_rings
+    )
+    yield GalleryEntry(
+        "lap-joint-9", "lap joint of two plates, stretched: its ends slip, one root", 0.3, 1, parts.lap_joint
+    )
 
 
 def _solids() -> Iterator[GalleryEntry]:
-    yield GalleryEntry("one-node-3d", "one node by its compliance: a public test", 0.0, 1, one_node_3d, 3)
-    jamming = partial(one_node_3d, ((2.0, 1.0, 0.2), (1.0, 2.0, 0.1), (0.2, 0.1, 1.0)), (0.9, 6.45, -0.4), 5.0)
+    yield GalleryEntry("one-node-3d", "one node by its compliance: a public test", 0.0, 1, problems.one_node_3d, 3)
+    jamming = partial(problems.one_node_3d, ((2.0, 1.0, 0.2), (1.0, 2.0, 0.1), (0.2, 0.1, 1.0)), (0.9, 6.45, -0.4), 5.0)
     yield GalleryEntry("one-node-3d-3", "one node that is jammed, slides or is open", 0.0, 3, jamming, 3)
     for p, cells, roots in ((4, (2, 1, 2), 1), (9, (3, 2, 2), 1), (16, (4, 3, 2), 1), (100, (10, 9, 4), None)):
         summary = f"block in 3D on {p} contact nodes, pressed and sheared"
-        yield GalleryEntry(f"block3d-{p}", summary, 0.5, roots, partial(block3d, *cells), 3)
+        yield GalleryEntry(f"block3d-{p}", summary, 0.5, roots, partial(problems.block3d, *cells), 3)
     for p, nz in ((2, 2), (4, 3)):
         summary = f"wedge in 3D on {p} patches, pulled straight: jammed, free or sliding out"
-        yield GalleryEntry(f"wedge3d-{p}-3", summary, 1.0, 3, partial(wedge3d, 2, 1, nz), 3)
-    build = partial(wedge3d, 2, 2, 2, (0.0, 5e-5, 5e-4))
+        yield GalleryEntry(f"wedge3d-{p}-3", summary, 1.0, 3, partial(problems.wedge3d, 2, 1, nz), 3)
+    build = partial(problems.wedge3d, 2, 2, 2, (0.0, 5e-5, 5e-4))
     yield GalleryEntry("wedge3d-4-9", "wedge in 3D, pulled obliquely: either end may come out", 3.0, 9, build, 3)
-    build = partial(wedge3d, 2, 1, 2, (4e-4, 1e-4, 1e-3), multipliers="nodes")
+    build = partial(problems.wedge3d, 2, 1, 2, (4e-4, 1e-4, 1e-3), multipliers="nodes")
     yield GalleryEntry("wedge3d-8-5", "wedge in 3D on 8 nodes, pulled obliquely: it may hang tilted", 2.0, 5, build, 3)
 
 

@@ -40,7 +40,7 @@ In 3D both take ``Bt1`` and ``Bt2`` instead of ``Bt``, which tell a problem in 3
   other matrices dense or in sparse parts.
 
 ``.h5``, ``.hdf5``
-    The format of the Frictional Contact Library (`enumsol.io.fclib`); needs h5py.
+    The format of the Frictional Contact Library (`enumsol.io.array_files`); needs h5py.
 
 ``.vtu``
     Displacements, contact forces and stresses of solutions in 2D and 3D, for ParaView: `enumsol.write_vtu`, by meshio.
@@ -62,10 +62,11 @@ from enumsol.decks.assembled import (
     read_calculix_stiffness,
 )
 from enumsol.errors import InvalidArgumentError, InvalidProblemError
-from enumsol.io import fclib, matrix_market, npz
+from enumsol.io import array_files
 from enumsol.model.problem import check_is_problem
 from enumsol.support.arguments import file_path
 from enumsol.support.files import writing
+from enumsol.support.messages import about
 
 if TYPE_CHECKING:
     import os
@@ -84,7 +85,7 @@ __all__ = [
 
 _A_PLACE = "the name of a file or directory"
 #: Endings of the files that hold a problem.
-SUFFIXES = (".npz", *fclib.SUFFIXES)
+SUFFIXES = (".npz", *array_files.FCLIB)
 _FORMATS = "a .npz file, a directory of MatrixMarket files, or an fclib file (.h5, .hdf5)"
 _READABLE = f"{_FORMATS} (enumsol.fem makes problems of meshes and .toml files)"
 
@@ -116,9 +117,8 @@ def read_problem(path: str | os.PathLike[str]) -> AnyProblem:
     """
     place = file_path(path, "path", _A_PLACE)
     try:
-        return _read(place)
-    except InvalidProblemError as error:
-        raise InvalidProblemError(f"{place}: {error}") from error
+        with about(place, InvalidProblemError):
+            return _read(place)
     except OSError as error:
         reason = error.strerror or error
         raise InvalidProblemError(f"{place}: it cannot be read ({reason}); expected a readable place") from error
@@ -158,24 +158,21 @@ def write_problem(problem: AnyProblem, path: str | os.PathLike[str]) -> None:
     given: Any = problem
     check_is_problem(given)
     place = file_path(path, "path", _A_PLACE)
-    with writing(place, "path"):
-        try:
-            _write(problem, place)
-        except InvalidProblemError as error:
-            raise InvalidProblemError(f"{place}: {error}") from error
+    with writing(place, "path"), about(place, InvalidProblemError):
+        _write(problem, place)
 
 
 def _read(place: Path) -> AnyProblem:
     if place.is_dir():
-        return matrix_market.read(place)
+        return array_files.read_directory(place)
     if not place.exists():
         raise InvalidProblemError(f"there is no such file or directory; expected {_READABLE}")
     if not place.is_file():
         raise InvalidProblemError(f"it is not a regular file; expected {_READABLE}")
     if place.suffix == ".npz":
-        return npz.read(place)
-    if place.suffix in fclib.SUFFIXES:
-        return fclib.read(place)
+        return array_files.read_archive(place)
+    if place.suffix in array_files.FCLIB:
+        return array_files.read_fclib(place)
     if place.suffix == ".mtx":
         raise InvalidProblemError(
             "one MatrixMarket file is not a problem; expected a directory with A.mtx, Bn.mtx and so on"
@@ -186,10 +183,10 @@ def _read(place: Path) -> AnyProblem:
 
 def _write(problem: AnyProblem, place: Path) -> None:
     if place.is_dir() or not place.suffix:
-        matrix_market.write(problem, place)
+        array_files.write_directory(problem, place)
     elif place.suffix == ".npz":
-        npz.write(problem, place)
-    elif place.suffix in fclib.SUFFIXES:
-        fclib.write(problem, place)
+        array_files.write_archive(problem, place)
+    elif place.suffix in array_files.FCLIB:
+        array_files.write_fclib(problem, place)
     else:
         raise InvalidArgumentError(f"{place}: its name ends in {place.suffix!r}; expected {_FORMATS}")

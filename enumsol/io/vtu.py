@@ -17,7 +17,7 @@ from enumsol.model.problem3d import ContactProblem3D
 from enumsol.model.shapes import body_shape, row_frames
 from enumsol.model.statuses import STATUSES
 from enumsol.support.arguments import file_path
-from enumsol.support.array_arguments import real_array
+from enumsol.support.array_arguments import array_of
 from enumsol.support.files import Content, write_files, writing
 from enumsol.support.messages import counted
 
@@ -221,10 +221,7 @@ def _array(state: SolvedState, name: str, shape: tuple[int, ...]) -> Floats:
         raise InvalidArgumentError(
             f"state is a {type(state).__name__} without {name}; expected u, lambda_n, lambda_t, u_n and u_t"
         )
-    array = real_array(getattr(state, name), f"{name} of the state", error=InvalidArgumentError)
-    if array.shape != shape:
-        raise InvalidArgumentError(f"{name} of the state has shape {array.shape}; expected {shape}")
-    return array
+    return array_of(getattr(state, name), f"{name} of the state", shape)
 
 
 def _row_data(problem: AnyProblem, state: SolvedState) -> dict[str, Floats]:

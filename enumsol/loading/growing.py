@@ -20,7 +20,6 @@ from enumsol.condensation.enclosure import NotEnclosedError
 from enumsol.errors import InvalidArgumentError
 from enumsol.loading.history import History
 from enumsol.loading.history_data import (
-    HistoryData,
     Refinement,
     Rounding,
     Stage,
@@ -64,11 +63,11 @@ _MOST = 20_000
 
 
 def refined(
-    grown: Callable[[Sequence[LoadStep]], HistoryData],
+    grown: Callable[[Sequence[LoadStep]], History],
     steps: Sequence[LoadStep],
     way: tuple[LoadStep, LoadStep],
     most: int,
-) -> HistoryData:
+) -> History:
     """The history with the finest increments that were tried: the first of which halving changed nothing, halved.
 
     ``way``: from where to where the load goes in the first step.
@@ -96,7 +95,7 @@ def halved(steps: Sequence[LoadStep], way: tuple[LoadStep, LoadStep], parts: int
     return found
 
 
-def shapes(history: HistoryData, every: int) -> set[Shape]:
+def shapes(history: History, every: int) -> set[Shape]:
     """The statuses along the histories, seen after every so many steps."""
     statuses = nx.get_node_attributes(history.graph, "statuses")
     return {tuple(statuses[node] for node in path if node[0] % every == 0) for path in history.paths()}
@@ -110,7 +109,7 @@ def _changed(one: set[Shape], other: set[Shape], steps: int) -> int:
     return 0
 
 
-def _incomparable(history: HistoryData) -> str | None:
+def _incomparable(history: History) -> str | None:
     """Why comparing a history would tell nothing about its increments, or None."""
     if history.counts[-1] > _MOST:
         return f"there are {history.counts[-1]} histories, too many to compare (at most {_MOST})"
@@ -265,11 +264,8 @@ def histories(
     arguments.instance_of(refine, bool, "refine")
     arguments.optional_executor(executor, jobs)
     arguments.optional_callable(progress, "progress")
-    limits = _Limits(
-        arguments.optional_count(max_branches, "max_branches"),
-        arguments.optional_count(max_nodes, "max_nodes"),
-        arguments.optional_seconds(time_limit),
-    )
+    counts = arguments.optional_count(max_branches, "max_branches"), arguments.optional_count(max_nodes, "max_nodes")
+    limits = _Limits(Deadline.after(time.perf_counter(), arguments.optional_seconds(time_limit)).deadline, *counts)
     fitted = steps_of(problem, steps)
     with workers_of(executor, jobs) as pool:
         search = {"arithmetic": arithmetic, "executor": pool, **options}
@@ -277,26 +273,25 @@ def histories(
         begun = [_Growing(problem, fitted, follow, tolerance, limits, search, progress)]
         halvings = arguments.optional_count(max_halvings, "max_halvings") or 0
 
-        def grown(several: Sequence[LoadStep]) -> HistoryData:
+        def grown(several: Sequence[LoadStep]) -> History:
             begun.append(_Growing(problem, several, follow, tolerance, limits, search, progress))
             return begun[-1].run()
 
         def work() -> History:
             if not refine:
-                return History(grown(fitted))
-            return History(refined(grown, fitted, way_to(problem, fitted[0]), halvings))
+                return grown(fitted)
+            return refined(grown, fitted, way_to(problem, fitted[0]), halvings)
 
         def rest(ending: Ending) -> History:
-            return History(begun[-1].history(str(Stop(StopReason.of(ending)))))
+            return begun[-1].history(str(Stop(StopReason.of(ending))))
 
         return keeping("histories", work, rest, lambda _: begun[-1].so_far)
 
 
 @dataclass
-class _Limits:
-    max_branches: int | None
-    max_nodes: int | None
-    seconds: float | None
+class _Limits(Deadline):
+    max_branches: int | None = None
+    max_nodes: int | None = None
     started: float = field(default_factory=time.perf_counter)
     nodes: int = 0
 
@@ -304,14 +299,13 @@ class _Limits:
         """Why nothing more is searched, or None."""
         if self.max_nodes is not None and self.nodes >= self.max_nodes:
             return f"stopped after max_nodes = {counted(self.max_nodes, 'node')}"
-        if self.seconds is not None and time.perf_counter() - self.started >= self.seconds:
-            return "stopped by the time limit"
-        return None
+        return "stopped by the time limit" if self.over else None
 
     def left(self) -> dict[str, Any]:
         """Nodes and time that one search may still take, as options of enumerate_roots."""
-        seconds = None if self.seconds is None else max(self.seconds - (time.perf_counter() - self.started), 1e-3)
-        return {"max_nodes": None if self.max_nodes is None else self.max_nodes - self.nodes, "time_limit": seconds}
+        seconds = self.remaining()
+        nodes = None if self.max_nodes is None else self.max_nodes - self.nodes
+        return {"max_nodes": nodes, "time_limit": None if seconds is None else max(seconds, 1e-3)}
 
 
 @dataclass
@@ -346,7 +340,7 @@ class _Growing:
         self.bases: dict[bytes, Any] = {}
         self.ends: dict[Any, SlipStart] = {}
 
-    def run(self) -> HistoryData:
+    def run(self) -> History:
         """Step by step, all starts of one before the next."""
         if self.search["arithmetic"] != "fast":
             with suppress(NotEnclosedError):
@@ -494,7 +488,7 @@ class _Growing:
     def _verdicts(self, stage: Stage) -> Sequence[Stability] | None:
         """The verdicts on the roots of a stage, or None where the time is over."""
         try:
-            with within(Deadline.after(self.limits.started, self.limits.seconds)):
+            with within(self.limits):
                 return stage.roots.stability()
         except TimeOverError:
             return None
@@ -503,9 +497,9 @@ class _Growing:
         stage = next(s for s in self.stages if node in self.node_of[s.number])
         return stage.roots[self.node_of[stage.number].index(node)]
 
-    def history(self, *more: str) -> HistoryData:
+    def history(self, *more: str) -> History:
         """Histories found so far, with more reasons why something may be missing."""
-        return HistoryData(
+        return History(
             self.problem,
             tuple(self.steps),
             self.search["arithmetic"],

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import base64
 import json
-from dataclasses import asdict
+from dataclasses import asdict, dataclass
 from fractions import Fraction
 from typing import TYPE_CHECKING, Any
 
@@ -24,13 +24,13 @@ from enumsol.proof.proof_file import Proof
 from enumsol.roots.root import Enclosure, Polytope, Root, RootFamily, summary
 from enumsol.roots.root_set import RigidBound, RootSet, SearchStats, Undecided
 from enumsol.support.arguments import file_path, positive_integer, shown
-from enumsol.support.files import reading, write_file
-from enumsol.support.immutable import Immutable, Listed
+from enumsol.support.files import plain_value, reading, write_file
+from enumsol.support.immutable import Listed
 from enumsol.support.plotting import checked_units, kept
 from enumsol.support.saved import Array, Maybe, check_kind, is_fraction, is_number, json_from
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Iterator, Mapping, Sequence
+    from collections.abc import Mapping, Sequence
     from pathlib import Path
 
     import pandas as pd
@@ -38,7 +38,7 @@ if TYPE_CHECKING:
 
     from enumsol.model.problem3d import AnyProblem
     from enumsol.roots.stability import Stability
-    from enumsol.support.array_types import Alpha, ArrayLike, Floats
+    from enumsol.support.array_types import Alpha, ArrayLike
 
 FORMAT, VERSION = "enumsol-history", 3
 _ARRAYS = ("lambda_n", "lambda_t", "u_n", "u_t")
@@ -55,17 +55,17 @@ def save_history(data: history_data.HistoryData, file: str | Path) -> None:
         "problem": data.problem.fingerprint,
         "arithmetic": data.arithmetic,
         "steps": [_step(step) for step in data.steps],
-        "stages": [_stage(stage) for stage in data.stages],
+        "stages": [_stage(stage) for stage in data.all_stages],
         "parents": data.parents,
         "followed": sorted(data.followed),
         "reasons": data.reasons,
         "seconds": data.seconds,
         "refinement": None if data.refinement is None else asdict(data.refinement),
     }
-    write_file(file_path(file, "file"), json.dumps(record), "file")
+    write_file(file_path(file, "file"), json.dumps(record, default=plain_value), "file")
 
 
-def load_history(file: str | Path, problem: AnyProblem) -> history_data.HistoryData:
+def load_history(file: str | Path, problem: AnyProblem) -> History:
     """Read what save_history wrote (see History.load).
 
     Raises
@@ -87,7 +87,7 @@ def load_history(file: str | Path, problem: AnyProblem) -> history_data.HistoryD
         refinement = record["refinement"]
         if refinement is not None:
             refinement = history_data.Refinement(**refinement | {"changed_at": tuple(refinement["changed_at"])})
-        return history_data.HistoryData(
+        return History(
             problem,
             steps,
             record["arithmetic"],
@@ -154,8 +154,8 @@ def _check_nodes(record: dict[str, Any]) -> None:
 
 
 def _step(step: LoadStep) -> dict[str, Any]:
-    parts = {name: None if (part := getattr(step, name)) is None else part.tolist() for name in ("friction", "load")}
-    return {"alpha": None if step.alpha is None else str(step.exact_alpha), **parts}
+    alpha = None if step.alpha is None else step.exact_alpha
+    return {"alpha": alpha, "friction": step.friction, "load": step.load}
 
 
 def _read_step(record: dict[str, Any], problem: AnyProblem) -> LoadStep:
@@ -168,15 +168,15 @@ def _stage(stage: history_data.Stage) -> dict[str, Any]:
     start, roots = stage.start, stage.roots
     return {
         "step": stage.step,
-        "offset": start.offset.tolist(),
-        "radius": None if start.radius is None else start.radius.tolist(),
-        "exact": None if start.exact is None else [str(value) for value in start.exact],
+        "offset": start.offset,
+        "radius": start.radius,
+        "exact": start.exact,
         "reasons": stage.reasons,
-        "alpha": str(Fraction(roots.alpha)),
+        "alpha": Fraction(roots.alpha),
         "as_float": isinstance(roots.alpha, float),
         "roots": [_root(root) for root in roots],
         "families": [_family(family) for family in roots.families],
-        "undecided": [[_names(part.statuses), part.reason, part.hint, part.leaves] for part in roots.undecided],
+        "undecided": [[part.statuses, part.reason, part.hint, part.leaves] for part in roots.undecided],
         **{name: getattr(roots, name) for name in _OF_ROOTS},
         "bound_needed": None if roots.rigid_bound is None else roots.rigid_bound.needed,
         "beyond_limit": None if roots.rigid_bound is None else roots.rigid_bound.beyond_limit,
@@ -194,7 +194,10 @@ def _read_stage(
     step = steps[record["step"] - 1]
     body = restarted(problem, start, step.load, step.friction)
     alpha = float(Fraction(record["alpha"])) if record["as_float"] else Fraction(record["alpha"])
-    proof = None if record["proof"] is None else Proof(base64.b64decode(record["proof"]))
+    needed, proof = (
+        record["bound_needed"],
+        None if record["proof"] is None else Proof(base64.b64decode(record["proof"])),
+    )
     roots = RootSet(
         alpha=alpha,
         roots=[_read_root(item, alpha, body) for item in record["roots"]],
@@ -206,40 +209,34 @@ def _read_stage(
         stats=SearchStats(**record["stats"]),
         node_ids=problem.node_ids,
         proof=proof,
-        rigid_bound=_read_bound(record, body),
+        rigid_bound=None if needed is None else RigidBound(body.rigid_reach, needed, record["beyond_limit"]),
     )
     return history_data.Stage(number, record["step"], start, roots, body, tuple(record["reasons"]))
-
-
-def _read_bound(record: dict[str, Any], body: AnyProblem) -> RigidBound | None:
-    needed = record["bound_needed"]
-    return None if needed is None else RigidBound(body.rigid_reach, needed, record["beyond_limit"])
 
 
 def _root(root: Root) -> dict[str, Any]:
     bounds = root.enclosure
     return {
-        "statuses": _names(root.statuses),
-        "active": [sorted(_names(held)) for held in root.active],
-        **{name: getattr(root, name).tolist() for name in _ARRAYS},
-        **{name: getattr(root, name) for name in _OF_ROOT},
-        "bounds": None if bounds is None else {name: _listed(getattr(bounds, name)) for name in _BOUNDS},
-        "slips": None if root.exact_slips is None else [str(value) for value in root.exact_slips],
+        "statuses": root.statuses,
+        "active": [sorted(status.value for status in held) for held in root.active],
+        **{name: getattr(root, name) for name in (*_ARRAYS, *_OF_ROOT)},
+        "bounds": None if bounds is None else {name: getattr(bounds, name) for name in _BOUNDS},
+        "slips": root.exact_slips,
         "angles": None if root.slip_angle is None else [[float(a).hex() for a in pair] for pair in root.slip_angle],
-        "rigid": _listed(root.rigid_coordinates),
+        "rigid": root.rigid_coordinates,
     }
 
 
 def _read_root(record: dict[str, Any], alpha: Alpha, problem: AnyProblem) -> Root:
     bounds, slips, angles = (record[name] for name in ("bounds", "slips", "angles"))
-    arrays: dict[str, Any] = {name: np.array(record[name], dtype=np.float64) for name in _ARRAYS}
+    arrays = {name: _array(record[name]) for name in _ARRAYS}
     return Root(
         alpha=alpha,
         statuses=_statuses(record["statuses"]),
         active=tuple(frozenset(_statuses(names)) for names in record["active"]),
         **arrays,
         **{name: record[name] for name in _OF_ROOT},
-        enclosure=None if bounds is None else _enclosure(bounds),
+        enclosure=None if bounds is None else Enclosure(**{name: _array(bounds[name]) for name in _BOUNDS}),
         slip_angle=None if angles is None else np.array([[float.fromhex(a) for a in pair] for pair in angles]),
         _condensed=condensation_of(problem),
         _rigid=_array(record["rigid"]),
@@ -247,24 +244,12 @@ def _read_root(record: dict[str, Any], alpha: Alpha, problem: AnyProblem) -> Roo
     )
 
 
-def _enclosure(record: dict[str, Any]) -> Enclosure:
-    arrays: dict[str, Any] = {name: _array(record[name]) for name in _BOUNDS}
-    return Enclosure(**arrays)
-
-
 def _family(family: RootFamily) -> dict[str, Any]:
-    parts = [
-        [_names(part.statuses), part.vertices.tolist(), part.dimension, _listed(part.rigid_coordinates)]
-        for part in family.polytopes
-    ]
+    parts = [[part.statuses, part.vertices, part.dimension, part.rigid_coordinates] for part in family.polytopes]
     return {"polytopes": parts, "index": family.index, "proven": family.vertices_proven}
 
 
-def _listed(values: Floats | None) -> list[Any] | None:
-    return None if values is None else values.tolist()
-
-
-def _array(values: object) -> Floats | None:
+def _array(values: object) -> Any:
     return None if values is None else np.array(values, dtype=np.float64)
 
 
@@ -276,23 +261,16 @@ def _read_family(record: dict[str, Any], alpha: Alpha) -> RootFamily:
     return RootFamily(alpha, parts, record["index"], vertices_proven=record["proven"])
 
 
-def _names(statuses: Iterable[ContactStatus | str | None]) -> list[str | None]:
-    return [status.value if isinstance(status, ContactStatus) else status for status in statuses]
-
-
 def _statuses(names: list[Any]) -> tuple[Any, ...]:
     known = {status.value: status for status in ContactStatus}
     return tuple(known.get(name, name) for name in names)
 
 
-class History(Immutable):
+@dataclass(frozen=True, eq=False, repr=False)
+class History(history_data.HistoryData):
     """All histories of solutions that a sequence of loads may leave behind (made by ``histories``).
 
     A node is a pair (step, root): steps are numbered from 1, the roots of one step from 0. (0, 0) is the start.
-
-    Parameters
-    ----------
-    data : HistoryData
 
     Attributes
     ----------
@@ -316,16 +294,6 @@ class History(Immutable):
     (0, (3, 5), 5, True)
     """
 
-    def __init__(self, data: history_data.HistoryData) -> None:
-        self.data = data
-        self.problem = data.problem
-        self.steps = data.steps
-        self.arithmetic = data.arithmetic
-        self.reasons = data.reasons
-        self.refinement = data.refinement
-        self.graph = data.graph
-        self._freeze()
-
     # -- what is proven --------------------------------------------------------------------------------------------
 
     @property
@@ -334,17 +302,12 @@ class History(Immutable):
         return self.arithmetic != "fast" and not self.reasons
 
     @property
-    def unique_until(self) -> int:
-        """The last step up to which it is proven that there is one history only; 0 where there is no such step."""
-        return self.data.unique_until
-
-    @property
     def proof(self) -> Proof | None:
         """Proof of the whole for ``enumsol.verify``: all searches, their starts, and which follows which.
 
         None in fast and exact arithmetic, and where there was no search at all.
         """
-        return history_data.history_proof(self.data)
+        return history_data.history_proof(self)
 
     # -- the graph -------------------------------------------------------------------------------------------------
 
@@ -383,28 +346,6 @@ class History(Immutable):
         ends = (node for node, degree in self.graph.out_degree() if degree == 0 and node != history_data.START)
         return Listed(ends, "end")
 
-    def stages(self, step: int) -> tuple[history_data.Stage, ...]:
-        """The searches of one step, from 1, one for each start."""
-        return Listed(self.data.stages_of(step), "stage")
-
-    def nodes_of(self, step: int) -> tuple[history_data.Node, ...]:
-        """The nodes of one step."""
-        return self.data.nodes_of(step)
-
-    def paths(self) -> Iterator[tuple[history_data.Node, ...]]:
-        """The histories one by one: the nodes from the first step to an end."""
-        return self.data.paths()
-
-    @property
-    def counts(self) -> tuple[int, ...]:
-        """The number of different histories up to every step, from step 1."""
-        return self.data.counts
-
-    @property
-    def dissipated(self) -> Mapping[history_data.Node, tuple[float, float]]:
-        """The work of friction from the start to every node, least and most over the histories that lead there."""
-        return self.data.dissipated
-
     def stability(
         self, *, mass: ArrayLike | sp.sparray | sp.spmatrix | None = None
     ) -> Mapping[history_data.Node, Stability]:
@@ -422,14 +363,9 @@ class History(Immutable):
         InvalidArgumentError, InvalidProblemError
             As `enumsol.stability`.
         """
-        for stage in self.data.stages:
+        for stage in self.all_stages:
             stage.roots.stability(mass=mass)
         return self.verdicts or {}
-
-    @property
-    def verdicts(self) -> Mapping[history_data.Node, Stability] | None:
-        """Verdicts that `stability` found last, or None."""
-        return self.data.verdicts
 
     # -- results ---------------------------------------------------------------------------------------------------
 
@@ -467,8 +403,8 @@ class History(Immutable):
                     "dissipated": given["dissipated"],
                     "dissipated_least": self.dissipated[node][0],
                     "dissipated_most": self.dissipated[node][1],
-                    "radius": self.data.stages[given["stage"]].largest_radius,
-                    "followed": node in self.data.followed,
+                    "radius": self.all_stages[given["stage"]].largest_radius,
+                    "followed": node in self.followed,
                 }
             )
         return pd.DataFrame(rows).astype({"index": "Int64"}) if rows else pd.DataFrame(rows)
@@ -513,7 +449,7 @@ class History(Immutable):
         """
         from enumsol.loading.figures import draw_history  # matplotlib comes with the first picture
 
-        return kept(draw_history(self.data, x, y, ax, checked_units(units)), file)
+        return kept(draw_history(self, x, y, ax, checked_units(units)), file)
 
     def save(self, file: str | Path) -> None:
         """Write the history, with the proofs of its searches, as JSON; the problem is not part of the file.
@@ -523,7 +459,7 @@ class History(Immutable):
         InvalidArgumentError
             The file cannot be written.
         """
-        save_history(self.data, file)
+        save_history(self, file)
 
     @classmethod
     def load(cls, file: str | Path, problem: AnyProblem) -> History:
@@ -536,19 +472,14 @@ class History(Immutable):
         """
         given: Any = problem
         check_is_problem(given)
-        return cls(load_history(file, problem))
-
-    @property
-    def closing_line(self) -> str:
-        """The closing line of the printed history."""
-        return self.data.closing_line
+        return load_history(file, problem)
 
     def text(self, units: tuple[str, str] | None = None) -> str:
         """Text that is printed, with units of forces and lengths if they are given."""
-        return history_data.history_text(self.data, checked_units(units))
+        return history_data.history_text(self, checked_units(units))
 
     def __repr__(self) -> str:
         return self.text()
 
     def _repr_html_(self) -> str:
-        return history_data.history_html(self.data)
+        return history_data.history_html(self)

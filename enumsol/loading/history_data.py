@@ -23,6 +23,7 @@ from enumsol.proof.proof_file import PROOF_VERSION
 from enumsol.proof.reading import rational_text
 from enumsol.proof.writer import ProofWriter
 from enumsol.roots.root import Root, summary
+from enumsol.support.immutable import Listed
 from enumsol.support.messages import counted, html_lines, html_table
 from enumsol.support.plotting import in_units
 from enumsol.trusted.positions import certain_statuses, tangential_positions
@@ -230,16 +231,16 @@ class Refinement:
         return f"after {times} the statuses still depend on the increments, from step {self.changed_at[-1]} on"
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class HistoryData:
-    """Data of all histories over load steps.
+    """The searches of a history, and what follows from them; see History.
 
     Attributes
     ----------
     problem : ContactProblem or ContactProblem3D
     steps : tuple of LoadStep
     arithmetic : str
-    stages : tuple of Stage
+    all_stages : tuple of Stage
         The roots of one step from one start each, step by step.
     parents : tuple of tuples of nodes
         Of every stage the nodes at whose ends it starts; none in the first step.
@@ -253,7 +254,7 @@ class HistoryData:
     problem: Any
     steps: tuple[LoadStep, ...]
     arithmetic: str
-    stages: tuple[Stage, ...]
+    all_stages: tuple[Stage, ...]
     parents: tuple[tuple[Node, ...], ...]
     followed: frozenset[Node]
     reasons: tuple[str, ...]
@@ -262,11 +263,11 @@ class HistoryData:
 
     @cached_property
     def graph(self) -> nx.DiGraph:
-        """See History."""
+        """Roots by their nodes, and which may follow which; see History."""
         graph = nx.DiGraph()
         graph.add_node(START, root=None)
         numbers: dict[int, int] = {}
-        for stage, parents in zip(self.stages, self.parents, strict=True):
+        for stage, parents in zip(self.all_stages, self.parents, strict=True):
             for root in stage.roots:
                 number = numbers.setdefault(stage.step, 0)
                 numbers[stage.step] = number + 1
@@ -278,19 +279,19 @@ class HistoryData:
 
     @property
     def verdicts(self) -> Mapping[Node, Stability] | None:
-        """The verdicts on all nodes, or None where those of some are not known."""
+        """Verdicts on all nodes that `stability` found last, or None where those of some are not known."""
         nodes = iter(node for node in self.graph if node != START)
         found: dict[Node, Stability] = {}
-        for stage in self.stages:
+        for stage in self.all_stages:
             verdicts = stage.roots.verdicts if len(stage.roots) else ()
             if verdicts is None:
                 return None
             found.update((node, verdict) for verdict, node in zip(verdicts, nodes, strict=False))
         return MappingProxyType(found)
 
-    def stages_of(self, step: int) -> tuple[Stage, ...]:
-        """The searches of one step, from 1."""
-        return tuple(stage for stage in self.stages if stage.step == step)
+    def stages(self, step: int) -> tuple[Stage, ...]:
+        """The searches of one step, from 1, one for each start."""
+        return Listed((stage for stage in self.all_stages if stage.step == step), "stage")
 
     def nodes_of(self, step: int) -> tuple[Node, ...]:
         """The nodes of one step."""
@@ -328,10 +329,10 @@ class HistoryData:
 
     @cached_property
     def unique_until(self) -> int:
-        """See History."""
+        """The last step up to which it is proven that there is one history only; 0 where there is no such step."""
         number = 0
         while number < len(self.steps):
-            stages = self.stages_of(number + 1)
+            stages = self.stages(number + 1)
             if len(stages) != 1 or stages[0].reasons or stages[0].roots.unique is not True:
                 break
             number += 1
@@ -342,20 +343,20 @@ class HistoryData:
         """The closing line of the printed history."""
         if self.arithmetic == "fast":
             return "complete: no" if self.reasons else "complete: not proven (fast arithmetic)"
-        first = self.stages_of(1)
+        first = self.stages(1)
         if self.unique_until:
             until = f"unique until step {self.unique_until}"
         elif first and first[0].roots.unique is False and len(first[0].roots):
             until = "not unique in step 1"
         else:
             until = "nothing is known to be unique"
-        if not self.reasons and (last := self.stages[-1].step) and not self.nodes_of(last):
+        if not self.reasons and (last := self.all_stages[-1].step) and not self.nodes_of(last):
             until += f"; nothing solves step {last}"
         return f"complete: {'no' if self.reasons else 'yes (proven)'}, {until}{self._within()}"
 
     def _within(self) -> str:
         """Words on the bound of rigid displacements, of a body that nothing holds."""
-        bounds = [stage.roots.rigid_bound for stage in self.stages if stage.roots.rigid_bound is not None]
+        bounds = [stage.roots.rigid_bound for stage in self.all_stages if stage.roots.rigid_bound is not None]
         if not bounds:
             return ""
         # all histories within the least of those that are needed
@@ -364,7 +365,7 @@ class HistoryData:
 
 def history_proof(data: HistoryData) -> Proof | None:
     """The proof; None where a search has none, as in fast and exact arithmetic and after an interruption."""
-    if not data.stages or any(stage.roots.proof is None for stage in data.stages):
+    if not data.all_stages or any(stage.roots.proof is None for stage in data.all_stages):
         return None
     following = _following(data)
     writer = ProofWriter()
@@ -376,17 +377,17 @@ def history_proof(data: HistoryData) -> Proof | None:
             "problem": data.problem.fingerprint,
             "p": data.problem.p,
             "steps": [_step_record(step) for step in data.steps],
-            "stages": len(data.stages),
+            "stages": len(data.all_stages),
         }
     )
-    for stage in data.stages:
+    for stage in data.all_stages:
         start, proof = stage.start, stage.roots.proof
         radius = None if start.radius is None else start.radius.ravel().tolist()
         writer.write(["s", stage.step, start.offset.ravel().tolist(), radius, following[stage.number]])
         assert proof is not None
         for record in proof.records():
             writer.write(record)
-    writer.write({"stages": len(data.stages)})
+    writer.write({"stages": len(data.all_stages)})
     return writer.close()
 
 
@@ -398,8 +399,8 @@ def _step_record(step: LoadStep) -> list[Any]:
 def _following(data: HistoryData) -> list[list[int]]:
     """For every stage the numbers of the stages that begin where a root of it ends."""
     stage_of: dict[Node, int] = {node: given["stage"] for node, given in data.graph.nodes(data=True) if node[0]}
-    found: list[set[int]] = [set() for _ in data.stages]
-    for stage, parents in zip(data.stages, data.parents, strict=True):
+    found: list[set[int]] = [set() for _ in data.all_stages]
+    for stage, parents in zip(data.all_stages, data.parents, strict=True):
         for parent in parents:
             found[stage_of[parent]].add(stage.number)
     return [sorted(numbers) for numbers in found]
@@ -496,7 +497,7 @@ def _rows(history: HistoryData) -> list[tuple[str, ...]]:
                 str(number),
                 "" if alpha is None else f"{float(alpha):.6g}",
                 str(len(nodes)),
-                str(len(history.stages_of(number))),
+                str(len(history.stages(number))),
                 str(history.counts[number - 1]),
                 span,
             )

@@ -6,7 +6,7 @@ import time
 from collections import Counter
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import closing
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from fractions import Fraction
 from functools import cached_property, partial
 from itertools import pairwise
@@ -22,7 +22,7 @@ from enumsol.model.problem import ContactProblem
 from enumsol.search.outcome import Stop, StopReason
 from enumsol.support import arguments
 from enumsol.support.array_arguments import vector_of
-from enumsol.support.deadlines import keeping
+from enumsol.support.deadlines import Deadline, keeping
 from enumsol.support.immutable import Immutable, Listed
 from enumsol.support.messages import counted
 from enumsol.support.plotting import area_entry, axes_of, checked_units, figure_of, in_units, kept, line_entry
@@ -35,7 +35,7 @@ if TYPE_CHECKING:
     import pandas as pd
 
     from enumsol.branches.graph import BranchGraph
-    from enumsol.support.array_types import Alpha, AlphaLike
+    from enumsol.support.array_types import Alpha, AlphaLike, Floats
     from enumsol.support.workers import Call
 
 
@@ -121,58 +121,39 @@ def multiplicity_map(
         options["without"] = without
     if "interval" in options or "progress" in options:
         raise InvalidArgumentError("interval and progress are not options here; expected those of branch_graph")
-    rows = _Rows(name, interval, values, make, options, arguments.optional_seconds(time_limit))
-    with workers_of(executor, jobs) as pool:
-        return keeping(
-            "multiplicity_map",
-            partial(rows.run, pool, progress),
-            lambda ending: rows.result(str(Stop(StopReason.of(ending)))),
-            lambda found: f" after {len(found.rows)} of {counted(len(values), 'value')}",
-        )
+    limits = Deadline.after(time.perf_counter(), arguments.optional_seconds(time_limit))
+    done: dict[int, MapRow] = {}
 
-
-@dataclass
-class _Rows:
-    """The rows of a map while they are made."""
-
-    name: str
-    interval: tuple[Alpha, Alpha]
-    values: list[float]
-    make: Callable[[float], ContactProblem]
-    options: dict[str, Any]
-    seconds: float | None
-    started: float = field(default_factory=time.perf_counter)
-    done: dict[int, MapRow] = field(default_factory=dict)
-
-    def run(self, executor: Executor | None, progress: Callable[[int, int], object] | None) -> MultiplicityMap:
-        """The map of all rows, while there is time."""
-        with closing(spread(executor, self._row_calls())) as found:
-            for place, row in found:
-                self.done[place] = row
-                if progress is not None:
-                    progress(len(self.done), len(self.values))
-        return self.result()
-
-    def _row_calls(self) -> Iterator[Call[int]]:
+    def calls() -> Iterator[Call[int]]:
         """Calls of map_row, while there is time; the options have what is left of it."""
-        for place, value in enumerate(self.values):
-            if (left := self._left()) == 0:
+        for place, value in enumerate(values):
+            left = limits.remaining()
+            if left is not None and left <= 0:
                 return
-            options = self.options if left is None else {**self.options, "time_limit": max(left, 1e-3)}
-            yield place, map_row, (self.make, value, self.interval, options)
+            own = options if left is None else {**options, "time_limit": max(left, 1e-3)}
+            yield place, map_row, (make, value, interval, own)
 
-    def _left(self) -> float | None:
-        """Seconds, 0 where the time is over; None without a limit."""
-        return None if self.seconds is None else max(self.seconds - (time.perf_counter() - self.started), 0.0)
-
-    def result(self, reason: str | None = None) -> MultiplicityMap:
-        """The map of what was done."""
-        left = [value for k, value in enumerate(self.values) if k not in self.done]
+    def result(reason: str | None = None) -> MultiplicityMap:
+        left = len(values) - len(done)
         why = reason or ("stopped by the time limit" if left else None)
-        missing = f"{why}, {counted(len(left), 'value')} not done" if why is not None else None
-        rows = tuple(self.done[k] for k in sorted(self.done))
-        ends = float(self.interval[0]), float(self.interval[1])
-        return MultiplicityMap(self.name, ends, rows, missing)
+        missing = None if why is None else f"{why}, {counted(left, 'value')} not done"
+        rows, ends = tuple(done[k] for k in sorted(done)), (float(interval[0]), float(interval[1]))
+        return MultiplicityMap(name, ends, rows, missing)
+
+    def work() -> MultiplicityMap:
+        with workers_of(executor, jobs) as pool, closing(spread(pool, calls())) as found:
+            for place, row in found:
+                done[place] = row
+                if progress is not None:
+                    progress(len(done), len(values))
+        return result()
+
+    return keeping(
+        "multiplicity_map",
+        work,
+        lambda ending: result(str(Stop(StopReason.of(ending)))),
+        lambda _: f" after {len(done)} of {counted(len(values), 'value')}",
+    )
 
 
 class MultiplicityMap(Immutable):
@@ -362,21 +343,11 @@ def _limit(row: MapRow) -> str:
 # -- the second parameter ----------------------------------------------------------------------------------------------
 
 
-@dataclass(frozen=True)
-class _Replaced:
-    """Makes a problem with another value of a field; other processes can import it."""
-
-    problem: ContactProblem
-    name: str
-    direction: Any = None
-
-    def __call__(self, value: float) -> ContactProblem:
-        """The problem at this value."""
-        if self.name == "load":
-            return self.problem.replace(f=self.problem.f + value * self.direction)
-        if self.name == "friction":
-            return self.problem.replace(friction=value, friction_slope=0.0)
-        return self.problem.replace(gap=value)
+def _replaced(problem: ContactProblem, name: str, direction: Floats | None, value: float) -> ContactProblem:
+    """The problem with another value of a field (a module-level function, so that other processes can import it)."""
+    if name == "load" and direction is not None:
+        return problem.replace(f=problem.f + value * direction)
+    return problem.replace(friction=value, friction_slope=0.0) if name == "friction" else problem.replace(gap=value)
 
 
 def _parameter(problem: object, over: object) -> tuple[str, Callable[[float], ContactProblem], list[float]]:
@@ -396,10 +367,10 @@ def _parameter(problem: object, over: object) -> tuple[str, Callable[[float], Co
         raise InvalidArgumentError(f"over is {arguments.shown(over)}; {_EXPECTED}")
     body = arguments.instance_of(problem, ContactProblem, "problem")
     if name != "load":
-        return name, _Replaced(body, name), _numbers(given)
+        return name, partial(_replaced, body, name, None), _numbers(given)
     if not isinstance(given, tuple) or len(given) != 2:
         raise InvalidArgumentError(f"over is {arguments.shown(over)}; {_EXPECTED}")
-    return name, _Replaced(body, name, vector_of(given[0], "direction", body.n)), _numbers(given[1])
+    return name, partial(_replaced, body, name, vector_of(given[0], "direction", body.n)), _numbers(given[1])
 
 
 def _numbers(values: object) -> list[float]:

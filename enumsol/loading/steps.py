@@ -86,7 +86,7 @@ class LoadStep(Sealed):
         if friction is not None:
             friction = _coefficients(friction, problem, number)
         moves = load is None and problem.load_slope is not None
-        if alpha is None and (moves or (friction is None and _friction_varies(problem))):
+        if alpha is None and (moves or (friction is None and np.any(problem.friction_slope))):
             raise InvalidArgumentError(
                 f"step {number} has no alpha, on which the problem's friction or load depends; expected one"
             )
@@ -215,11 +215,6 @@ def _from_table(problem: Problem, table: pd.DataFrame, expected: str) -> list[Lo
 def _cell(value: object, name: str) -> Any:
     """A number of a table."""
     return alpha_value(value, name) if name == "alpha" else float(alpha_value(value, name))
-
-
-def _friction_varies(problem: Problem) -> bool:
-    """True if the coefficients change with alpha."""
-    return bool(np.any(problem.friction_slope))
 
 
 def _array(value: ArrayLike, name: str) -> Any:

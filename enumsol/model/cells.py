@@ -321,6 +321,12 @@ def lines_along(facets: Integers) -> Integers:
     return facets if facets.shape[1] == 2 else facets[:, [0, 2, 1]]
 
 
+def edges_of(outlines: Integers) -> Integers:
+    """Edges of outlines of facets, (k, 2), each once."""
+    edges = np.sort(np.stack([outlines, np.roll(outlines, -1, axis=1)], axis=2).reshape(-1, 2), axis=1)
+    return np.unique(edges[edges[:, 0] != edges[:, 1]], axis=0)
+
+
 def outline_edges(points: Floats, faces: Integers) -> Integers:
     """Edges (k, 2) of outlines of boundary facets at which the surface of a solid bends by more than 20 degrees."""
     after = np.roll(faces, -1, axis=1)

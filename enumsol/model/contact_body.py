@@ -14,11 +14,10 @@ import scipy.sparse as sp
 
 from enumsol.condensation.data import exactly_at
 from enumsol.errors import EnumsolError, InvalidArgumentError, InvalidProblemError, NotHeldError
-from enumsol.model.mass import checked_mass
-from enumsol.model.mesh import BodyMesh
+from enumsol.model.mesh import ASYMMETRY_TOLERANCE, BodyMesh, checked_mass
 from enumsol.model.rigid_modes import RigidModes, largest_displacement
 from enumsol.support.arguments import alpha_value, instance_of, shown
-from enumsol.support.array_arguments import real_array, real_matrix
+from enumsol.support.array_arguments import array_of, real_array, real_matrix
 from enumsol.support.immutable import Immutable, SealedMatrix, sealed
 from enumsol.support.messages import counted
 
@@ -26,13 +25,10 @@ if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping, Sequence
 
     from enumsol.condensation.condensed import CondensedProblem
-    from enumsol.condensation.enclosure import CondensedEnclosure
+    from enumsol.condensation.enclosure import CondensedEnclosure, Products
     from enumsol.condensation.factorization import Factorization
-    from enumsol.condensation.products import Products
     from enumsol.support.array_types import AlphaLike, ArrayLike, Floats, Indices
 
-#: An asymmetry of A up to this fraction of max|A| is rounding of the user's assembly and is averaged away.
-ASYMMETRY_TOLERANCE = 1e-12
 #: Singular values of the row-normalised contact rows below this fraction of the largest mean dependent rows.
 ROW_RANK_TOLERANCE = 1e-12
 
@@ -59,7 +55,7 @@ class ContactBody(Immutable):
     friction_slope: Any
     slip_offset: Floats
     #: How far the slip offset may be from ``slip_offset``, and its value where no floats hold it: a step of a history
-    #: starts where the step before it ended (see enumsol.model.restart).
+    #: starts where the step before it ended (see enumsol.model.problem).
     offset_radius: Floats | None = None
     exact_offset: tuple[Fraction, ...] | None = None
     #: The problem that this one was made from with the same matrices, which computes what rests on them for both.
@@ -100,7 +96,7 @@ class ContactBody(Immutable):
         self.gap = vector(gap, "gap", p, broadcast=True)
         self.load_slope = None if load_slope is None else vector(load_slope, "load_slope", n)
         self.node_ids = _node_ids(node_ids, p)
-        self.coordinates = None if coordinates is None else _coordinates(coordinates, p, len(rows))
+        self.coordinates = None if coordinates is None else sealed(_places(coordinates, p, len(rows)))
 
     @property
     def A(self) -> sp.csc_array:  # noqa: N802 (the field's letter)
@@ -260,7 +256,7 @@ class ContactBody(Immutable):
         if (origin := self._origin) is not None:
             mine, theirs = ((body.f, body.load_slope) for body in (self, origin))
             return origin.products if all(map(_equal, mine, theirs)) else origin.products.with_loads_of(self)
-        from enumsol.condensation.products import Products  # as above
+        from enumsol.condensation.enclosure import Products  # as above
 
         return Products.of(self)
 
@@ -576,10 +572,6 @@ def _node_ids(value: Iterable[object] | None, p: int) -> tuple[Any, ...]:
     return ids
 
 
-def _coordinates(value: ArrayLike, p: int, dimension: int) -> Floats:
-    array = real_array(value, "coordinates")
-    if array.shape != (p, dimension):
-        raise InvalidProblemError(
-            f"coordinates has shape {array.shape}; expected (p, {dimension}) = ({p}, {dimension})"
-        )
-    return sealed(array)
+def _places(value: ArrayLike, p: int, dimension: int) -> Floats:
+    expected = f"(p, {dimension}) = ({p}, {dimension})"
+    return array_of(value, "coordinates", (p, dimension), expected, InvalidProblemError)

@@ -1,17 +1,24 @@
-"""Discretization of a problem, as far as it is kept: the mesh, for pictures, files and norms."""
+"""Discretization of a problem, as far as it is kept: the mesh, for pictures, files and norms, and its mass."""
 
 from __future__ import annotations
 
+import hashlib
+from collections.abc import Iterable
 from functools import cached_property
 
 import numpy as np
 import scipy.sparse as sp
 
 from enumsol.errors import InvalidArgumentError, InvalidProblemError
-from enumsol.model.cells import numbers_of_nodes
-from enumsol.support.array_arguments import real_array, real_matrix, vector_of
+from enumsol.model.cells import KINDS, by_kind, numbers_of_nodes
+from enumsol.support.arguments import shown
+from enumsol.support.array_arguments import array_of, real_array, real_matrix, vector_of
 from enumsol.support.array_types import ArrayLike, Floats, Integers
 from enumsol.support.immutable import Immutable, SealedMatrix, sealed
+
+#: An asymmetry of A or of the mass up to this fraction of the largest entry is rounding of the user's assembly and is
+#: averaged away; so are negative eigenvalues of the mass up to a thousand times as much, relative to its diagonal.
+ASYMMETRY_TOLERANCE = 1e-12
 
 
 class BodyMesh(Immutable):
@@ -83,9 +90,7 @@ class BodyMesh(Immutable):
             raise InvalidProblemError(
                 f"mesh_motion has shape {self._motion.shape}; expected {d} N = {d * count} rows, {d} for each node"
             )
-        self.offset = None if offset is None else sealed(real_array(offset, "mesh_offset"))
-        if self.offset is not None and self.offset.shape != self.points.shape:
-            raise InvalidProblemError(f"mesh_offset has shape {self.offset.shape}; expected (N, {d}) = ({count}, {d})")
+        self.offset = None if offset is None else _of(offset, "mesh_offset", (count, d), f"(N, {d}) = ({count}, {d})")
         of_facets = numbers_of_nodes(d - 1)
         self.facets = None if facets is None else _elements(facets, "mesh_facets", of_facets, count)
         self.rows = None if rows is None else sealed(_numbers(rows, "mesh_rows", None, least=-1))
@@ -96,8 +101,10 @@ class BodyMesh(Immutable):
         self.lame = None if lame is None else _lame(lame, len(self.cells))
         self.elasticity = None if elasticity is None else _elasticity(elasticity, len(self.cells), d)
         shape = len(self.cells), 4 if self.axisymmetric else {2: 3, 3: 6}[d]
-        self.initial_stress = _stresses(initial_stress, "mesh_stress", shape)
-        self.stress_slope = _stresses(stress_slope, "mesh_stress_slope", shape)
+        self.initial_stress, self.stress_slope = (
+            None if values is None else _of(values, name, shape, f"(M, s) = {shape}")
+            for values, name in ((initial_stress, "mesh_stress"), (stress_slope, "mesh_stress_slope"))
+        )
         self._freeze()
 
     @property
@@ -112,8 +119,6 @@ class BodyMesh(Immutable):
 
     def mass(self) -> sp.csc_array:
         """Consistent mass of the degrees of freedom for a density of one, (n, n) [length^d]."""
-        from enumsol.model.mass import consistent_mass  # scipy's solvers come with it
-
         of_nodes = consistent_mass(self.points, self.cells, np.ones(len(self.cells)), axisymmetric=self.axisymmetric)
         return sp.csc_array(self.motion.T @ sp.kron(of_nodes, sp.eye_array(self.points.shape[1])) @ self.motion)
 
@@ -236,20 +241,15 @@ def _numbers(value: ArrayLike, name: str, count: int | None, least: int = 0) -> 
     return array.astype(np.int64)
 
 
+def _of(value: ArrayLike, name: str, shape: tuple[int, ...], expected: str) -> Floats:
+    return sealed(array_of(value, name, shape, expected, InvalidProblemError))
+
+
 def _lame(value: ArrayLike, count: int) -> Floats:
     array = real_array(value, "mesh_lame")
     if array.shape not in ((2,), (count, 2)):
         raise InvalidProblemError(f"mesh_lame has shape {array.shape}; expected (2,) or (M, 2) = ({count}, 2)")
     return sealed(np.tile(array, (count, 1)) if array.ndim == 1 else array)
-
-
-def _stresses(values: ArrayLike | None, name: str, shape: tuple[int, int]) -> Floats | None:
-    if values is None:
-        return None
-    found = sealed(real_array(values, name))
-    if found.shape != shape:
-        raise InvalidProblemError(f"{name} has shape {found.shape}; expected (M, s) = {shape}")
-    return found
 
 
 def _elasticity(value: ArrayLike, count: int, dimension: int) -> Floats:
@@ -268,3 +268,113 @@ def _elements(value: ArrayLike, name: str, sizes: tuple[int, ...], count: int) -
             f"{name} has shape {array.shape}; expected (k, m) with m among {', '.join(map(str, sizes))}"
         )
     return sealed(array)
+
+
+# -- mass --------------------------------------------------------------------------------------------------------------
+# The mass of a body: consistent mass of a mesh by shape functions, and the check of a matrix that is given.
+
+
+def checked_mass(mass: ArrayLike | sp.sparray | sp.spmatrix, A: sp.csc_array, modes: Floats) -> sp.csc_array:
+    """A mass matrix for a stiffness, (n, n).
+
+    Parameters
+    ----------
+    mass : (n, n) array_like or sparse
+    A : (n, n) csc_array
+    modes : (n, r) array
+        Rigid modes of the body.
+
+    Raises
+    ------
+    InvalidProblemError
+        It is not symmetric and positive semidefinite, or some rigid mode has no mass.
+    """
+    M, n = real_matrix(mass, "mass"), A.shape[0]
+    if M.shape != (n, n):
+        raise InvalidProblemError(f"mass has shape {M.shape}; expected (n, n) = ({n}, {n})")
+    largest = float(np.max(np.abs(M.data), initial=0.0))
+    if not largest:
+        raise InvalidProblemError("mass is zero; expected a body with a mass")
+    worst = float(np.max(np.abs(sp.csc_array(M - M.T).data), initial=0.0))
+    if worst > ASYMMETRY_TOLERANCE * largest:
+        raise InvalidProblemError(
+            f"mass is not symmetric: max|M - M'| = {worst:.3g} where max|M| = {largest:.3g}; "
+            "expected a symmetric matrix"
+        )
+    M = sp.csc_array(0.5 * M + 0.5 * M.T) if worst else M
+    M.sort_indices()
+    diagonal = M.diagonal()
+    if np.any(diagonal < 0):
+        row = int(np.argmin(diagonal))
+        raise InvalidProblemError(
+            f"mass is not positive semidefinite: its diagonal entry {row} is {shown(float(diagonal[row]))}; "
+            "expected entries >= 0"
+        )
+    if not _semidefinite(M, diagonal):
+        raise InvalidProblemError("mass is not positive semidefinite; expected a mass matrix M >= 0")
+    if modes.shape[1] and np.linalg.eigvalsh(modes.T @ (M @ modes))[0] <= 0:
+        raise InvalidProblemError("mass is zero for some of rigid_modes; expected A + mu M > 0 for mu > 0")
+    return M
+
+
+def _semidefinite(M: sp.csc_array, diagonal: Floats) -> bool:
+    """True if a matrix has no eigenvalue below zero, up to rounding and relative to its diagonal."""
+    from enumsol.condensation.factorization import Factorization  # scipy's solvers come with the first use
+
+    own = np.flatnonzero(diagonal > 0)
+    if sp.csr_array(M)[np.flatnonzero(diagonal == 0)].nnz:
+        return False
+    part = sp.csc_array(sp.csr_array(M)[own][:, own])
+    lifted = sp.csc_array(part + sp.diags_array(1e3 * ASYMMETRY_TOLERANCE * part.diagonal()))
+    try:
+        Factorization(lifted).check_positive_definite()
+    except InvalidProblemError:
+        return False
+    return True
+
+
+def consistent_mass(points: Floats, cells: Integers, density: Floats, *, axisymmetric: bool = False) -> sp.csc_array:
+    """Consistent mass of one component of the nodes, the same for all, (N, N).
+
+    Parameters
+    ----------
+    points : (N, d) array
+    cells : (M, k) int array, in the order of VTK
+    density : (M,) array
+        Mass per volume, or in 2D per area, of every cell.
+    axisymmetric : bool
+        x is the distance from the axis, and the mass is that of the whole circumference.
+    """
+    dimension, parts = points.shape[1], []
+    for rows, nodes in by_kind(dimension, cells):
+        kind = KINDS[dimension, nodes.shape[1]]
+        X, W = kind.quadrature(2 * int(np.max(np.sum(kind.powers, axis=1))) + dimension)
+        N = kind.values(X)
+        J = np.abs(np.linalg.det(np.einsum("mai,akq->mqik", points[nodes], kind.slopes(X))))
+        if axisymmetric:
+            J = J * 2.0 * np.pi * (points[nodes, 0] @ N)
+        parts.append((nodes, np.einsum("aq,bq,mq->mab", N, N, J * W * density[rows, None], optimize=True)))
+    return assembled(parts, len(points))
+
+
+def assembled(parts: Iterable[tuple[Integers, Floats]], size: int) -> sp.csc_array:
+    """Sum (size, size) of matrices of cells: parts have the rows (m, s) of their cells, and matrices (m, s, s)."""
+    rows, columns, data = [np.zeros(0, dtype=np.int64)], [np.zeros(0, dtype=np.int64)], [np.zeros(0)]
+    for own, K in parts:
+        rows.append(np.repeat(own, own.shape[1], axis=1).ravel())
+        columns.append(np.tile(own, own.shape[1]).ravel())
+        data.append(K.ravel())
+    places = (np.concatenate(rows), np.concatenate(columns))
+    return sp.csc_array((np.concatenate(data), places), shape=(size, size))
+
+
+def mass_fingerprint(mass: sp.csc_array) -> str:
+    """SHA-256 of a mass: a name, n, and row, column and value of every entry that is not zero, column by column."""
+    entries = sp.coo_array(sp.csc_array(mass))
+    kept = entries.data != 0
+    rows, columns, values = entries.coords[0][kept], entries.coords[1][kept], entries.data[kept]
+    order = np.lexsort((rows, columns))
+    digest = hashlib.sha256(b"enumsol mass 1" + np.array(mass.shape[0], "<i8").tobytes())
+    for part, kind in ((rows, "<i8"), (columns, "<i8"), (values, "<f8")):
+        digest.update(part[order].astype(kind).tobytes())
+    return digest.hexdigest()

@@ -27,13 +27,6 @@ if TYPE_CHECKING:
 
 
 _EXPECTED = "expected a number, a pair (F1, F2) of numbers or (p,) arrays, a FrictionTable, or a callable F(node, slip)"
-#: Slips per node at which a function is sampled for jumps; bisections of the largest step; the share of the step
-#: that must be left for it to count as a jump.
-_JUMP_SAMPLES, _JUMP_BISECTIONS, _JUMP_SHARE = 33, 40, 0.5
-
-
-#: How far from 1 weights of a mean may add up to.
-_SUM_TOLERANCE = 1e-9
 
 
 @dataclass(frozen=True)
@@ -200,20 +193,21 @@ def warn_of_jumps(law: FrictionLaw, reach: Floats, labels: tuple[Any, ...]) -> N
     The largest step between neighbouring samples of every node is bisected: a step that does not get smaller with the
     distance is a jump. A function that jumps need not have a fixed point (paper, Section 3).
     """
-    shares = np.linspace(0.0, 1.0, _JUMP_SAMPLES)
+    shares = np.linspace(0.0, 1.0, 33)
     values = np.array([law.at(share * reach) for share in shares])
     step = np.max(np.abs(np.diff(values, axis=0)), axis=2)
     where = np.argmax(step, axis=0)
     low, high = shares[where] * reach, shares[where + 1] * reach
     at_low, at_high = law.at(low), law.at(high)
-    for _ in range(_JUMP_BISECTIONS):
+    for _ in range(40):
         middle = 0.5 * (low + high)
         at_middle = law.at(middle)
         first = _size(at_middle - at_low) >= _size(at_high - at_middle)
         low, high = np.where(first, low, middle), np.where(first, middle, high)
         at_low, at_high = np.where(first[:, None], at_low, at_middle), np.where(first[:, None], at_middle, at_high)
     largest, scale = np.max(step, axis=0), np.max(np.abs(values), axis=(0, 2))
-    jumps = (_size(at_high - at_low) > _JUMP_SHARE * largest) & (largest > 1e-6 * scale)
+    # the share of the step that must be left for it to count as a jump
+    jumps = (_size(at_high - at_low) > 0.5 * largest) & (largest > 1e-6 * scale)
     if np.any(jumps):
         node = int(np.argmax(jumps))
         warnings.warn(
@@ -281,7 +275,8 @@ class SlipMean(Immutable):
         if np.any(matrices["weights"].data < 0):
             raise InvalidProblemError("slip_mean has a negative weight; expected weights >= 0")
         sums = np.asarray(matrices["weights"].sum(axis=1)).ravel()
-        if np.any(np.abs(sums - 1.0) > _SUM_TOLERANCE):
+        # how far from 1 weights of a mean may add up to
+        if np.any(np.abs(sums - 1.0) > 1e-9):
             row = int(np.argmax(np.abs(sums - 1.0)))
             raise InvalidProblemError(f"slip_mean has weights that add up to {sums[row]:g} in row {row}; expected 1")
         self._freeze()

@@ -18,8 +18,6 @@ from enumsol.support.messages import listed
 
 #: A N is rounding of the user's assembly up to this fraction of |A| |N|; theory, section 14.1, says what is then meant.
 MODE_TOLERANCE = 1e-9
-#: Pivots of the modes below this fraction of the largest mean dependent modes.
-INDEPENDENCE_TOLERANCE = 1e-9
 #: Modes that have less than this part of the largest share in a displacement are not named.
 NAMED = 1e-4
 
@@ -146,7 +144,8 @@ def _pivots(N: Floats) -> Any:
     while columns:
         part = np.abs(rest[:, columns])
         row, place = divmod(int(np.argmax(part)), len(columns))
-        if part[row, place] <= INDEPENDENCE_TOLERANCE:
+        # pivots of the modes below this fraction of the largest mean dependent modes
+        if part[row, place] <= 1e-9:
             raise InvalidProblemError(
                 f"rigid_modes has linearly dependent columns ({columns[place]} and others); expected independent ones"
             )

@@ -172,6 +172,12 @@ def places(vectors: Floats) -> Floats:
     return np.asarray(np.ldexp(quarter + s, DEEPEST))
 
 
+def holding(vector: Sequence[float] | Floats, level: int) -> int:
+    """The sector of a level that holds the direction of a vector."""
+    first = 1 << level
+    return first + (int(places(np.asarray(vector, dtype=np.float64))) >> (DEEPEST + 2 - level)) % first
+
+
 def parts_around(number: int, low: float, high: float, level: int) -> tuple[int, ...]:
     """A sector in at most three parts, whose middle one holds what is between two places, by sectors of a level."""
     up = max(DEEPEST + 2 - max(level, level_of(number)), 0)

@@ -13,8 +13,9 @@ from enumsol.proof.reading import (
     quoted,
     rational_from,
 )
-from enumsol.proof.records import ClosingRecord, Limits, Record, Tree
+from enumsol.proof.records import Limits, Record, Tree
 from enumsol.trusted.space.curve_runs import LinkRange
+from enumsol.trusted.space.pieces import lies_in
 from enumsol.trusted.space.solution_curve import CurveBox
 
 if TYPE_CHECKING:
@@ -116,27 +117,8 @@ def box_from(record: object, limits: Limits) -> CurveBoxRecord:
     return found
 
 
-@dataclass(frozen=True)
-class CutPiece(Record):
-    """The piece of alpha is cut here; the subtrees of both parts follow, the lower one first."""
-
-    kind, sizes = "p", (2,)
-
-    alpha: str
-
-    def between(self, low: Fraction, high: Fraction) -> Fraction:
-        """Alpha of the cut; RecordError where it is not within the piece."""
-        try:
-            alpha = rational_from(self.alpha)
-        except ValueError as error:
-            raise RecordError(f"a piece is cut nowhere: {error}") from None
-        if not low < alpha < high:
-            raise RecordError("a piece is not cut within")
-        return alpha
-
-
 @dataclass(frozen=True, eq=False)
-class OnCurve(ClosingRecord):
+class OnCurve(Record):
     """All solutions over the piece lie on a curve, in these of its boxes, one after the other.
 
     Attributes
@@ -149,7 +131,7 @@ class OnCurve(ClosingRecord):
         its solutions lie in the boxes.
     """
 
-    kind, sizes, trees = "k", (3, 4), Tree.PIECES
+    kind, sizes, trees, closing = "k", (3, 4), Tree.PIECES, True
 
     first: int
     last: int
@@ -182,7 +164,7 @@ class OnCurve(ClosingRecord):
 
 
 @dataclass(frozen=True)
-class ThroughCurveBox(ClosingRecord):
+class ThroughCurveBox(Record):
     """All roots over the piece lie on one arc, and one of its points in this box.
 
     Attributes
@@ -194,7 +176,7 @@ class ThroughCurveBox(ClosingRecord):
     leaf : codes of a leaf whose root at that alpha is the point
     """
 
-    kind, sizes, trees = "t", (6,), Tree.PIECES
+    kind, sizes, trees, final, closing = "t", (6,), Tree.PIECES, True, True
 
     box: int
     low: str
@@ -207,7 +189,6 @@ class ThroughCurveBox(ClosingRecord):
         """The entries; RecordError where there is no such box, or they are no numbers or no leaf."""
         box, low, high, alpha, leaf = entries
         _boxes([box], limits)
-        check_complete(limits.codes)
         if not isinstance(leaf, list) or len(leaf) != limits.p or not all(map(is_code_of_leaf, leaf)):
             raise RecordError("the leaf of a point of an arc is none")
         try:
@@ -225,10 +206,11 @@ class ThroughCurveBox(ClosingRecord):
         if not a <= low <= narrowed.low <= narrowed.high <= high <= b:
             return False
         whole, (known, number) = piece.over(low, high), boxes[self.box]
-        arc, point = whole.arc(codes), (rational_from(self.alpha), self.leaf)
-        if arc is None or not whole.meets(arc, point, known.problem, known.chain.links[number].curve):
+        arc, (at, root) = whole.arc(codes), whole.root_at(rational_from(self.alpha), self.leaf)
+        if arc is None or root is None or not arc.has(root, self.leaf):
             return False
-        return known.chain.runs_through(low, high)
+        met = lies_in(at.place(root, known.problem), known.chain.links[number].curve)
+        return met and known.chain.runs_through(low, high)
 
 
 def _boxes(entries: list[Any], limits: Limits) -> list[int]:

@@ -1,7 +1,7 @@
 """Leaves of proofs as classes, and the trees in which they may stand (docs/proof_format.md).
 
 What a leaf says of its assignment is true where its method ``holds`` shows it, which search and checker both call. What
-stands in trees over pieces of alpha only is in ``proof.curve_records``.
+stands in trees over pieces of alpha in 3D only is in ``proof.curve_records``.
 """
 
 from __future__ import annotations
@@ -17,7 +17,6 @@ from enumsol.condensation.enclosure import EnclosedSystem
 from enumsol.proof.proof_file import packed
 from enumsol.proof.reading import (
     RecordError,
-    check_complete,
     checked_row,
     multipliers_from,
     nodes_from,
@@ -25,11 +24,12 @@ from enumsol.proof.reading import (
     selection_from,
     weights_from,
 )
-from enumsol.proof.records import ClosingRecord, EnclosureRecord, Limits, Record, Tree
+from enumsol.proof.records import CutPiece, EnclosureRecord, Limits, Record, Tree
 from enumsol.support.array_types import Codes, Floats, Indices
 from enumsol.trusted.at_alpha import joint_root
 from enumsol.trusted.exclusion import Terms, exclusion_margin
 from enumsol.trusted.floating_bounds import is_unbalanced
+from enumsol.trusted.over_interval import KINDS
 from enumsol.trusted.status_rows import CONTACT, ROW_KINDS, SLIP_MINUS, SLIP_PLUS, STICK, UNDECIDED, refines
 from enumsol.trusted.uniqueness import closed_solution, lone_root, numbers_of
 
@@ -59,7 +59,7 @@ RATIONAL = "rational"
 class UndecidedRecord(Record):
     """A leaf of which nothing is shown, for this reason."""
 
-    kind, sizes = "u", (2,)
+    kind, sizes, trees = "u", (2,), Tree.POINTS | Tree.PIECES
 
     reason: Any
 
@@ -102,7 +102,8 @@ class Excluded(Record):
         if len(entries) > 2 and by != RATIONAL:
             limits.check_form(by)
         if not limits.in_space:
-            return cls(*multipliers_from(entries[:2], ROW_KINDS * limits.p), by)
+            kinds = KINDS if limits.tree & Tree.GRAPHS else ROW_KINDS
+            return cls(*multipliers_from(entries[:2], kinds * limits.p), by)
         rows, values = multipliers_from(entries[:2], None, ends=2 if limits.tree & Tree.PIECES else 1)
         return cls([checked_row(row, limits.p) for row in rows], values, by)
 
@@ -163,21 +164,11 @@ class Unbalanced(Record):
 # -- complete assignments ----------------------------------------------------------------------------------------------
 
 
-class Solved(Record):
-    """Base of leaves that say all of a selection; they stand at complete assignments only."""
-
-    @classmethod
-    def read(cls, record: list[Any], limits: Limits) -> Any:
-        """A leaf of this kind, once the assignment is complete."""
-        check_complete(limits.codes)
-        return super().read(record, limits)
-
-
 @dataclass(frozen=True)
-class NoRoot(Solved):
+class NoRoot(Record):
     """A selection holds no root; by RATIONAL, that is tested in rational arithmetic."""
 
-    kind, sizes = "n", (1, 2)
+    kind, sizes, trees, final = "n", (1, 2), Tree.POINTS | Tree.PIECES, True
 
     by: str | None = None
 
@@ -190,10 +181,10 @@ class NoRoot(Solved):
 
 
 @dataclass(frozen=True, eq=False)
-class RegularRoot(Solved):
+class RegularRoot(Record):
     """A selection holds one root, which is regular."""
 
-    kind, sizes, trees = "r", (4,), Tree.POINTS
+    kind, sizes, trees, final = "r", (4,), Tree.POINTS, True
 
     enclosure: EnclosureRecord
 
@@ -204,7 +195,7 @@ class RegularRoot(Solved):
 
 
 @dataclass(frozen=True, eq=False)
-class SharedRoot(Solved):
+class SharedRoot(Record):
     """Selections of a body that nothing holds share one root, in which some nodes of this one stick or slip.
 
     Attributes
@@ -213,7 +204,7 @@ class SharedRoot(Solved):
     enclosure : EnclosureRecord
     """
 
-    kind, sizes, trees = "g", (5,), Tree.FLOATING_PLANE
+    kind, sizes, trees, final = "g", (5,), Tree.FLOATING_PLANE, True
 
     slips: tuple[tuple[int, int], ...]
     enclosure: EnclosureRecord
@@ -244,10 +235,10 @@ class SharedRoot(Solved):
 
 
 @dataclass(frozen=True, eq=False)
-class RootSetRecord(Solved):
+class RootSetRecord(Record):
     """In rational arithmetic, the roots of a selection are the hull of these points: lists of fractions as texts."""
 
-    kind, sizes, trees = "D", (3,), Tree.PLANE | Tree.FLOATING_PLANE
+    kind, sizes, trees, final = "D", (3,), Tree.PLANE | Tree.FLOATING_PLANE, True
 
     points: list[list[str]]
     dimension: Any
@@ -263,11 +254,18 @@ class RootSetRecord(Solved):
         return cls(*entries)
 
 
+@dataclass(frozen=True)
+class Survivor(Record):
+    """A selection that may hold somewhere in a piece of alpha."""
+
+    kind, sizes, trees, final = "s", (1,), Tree.GRAPHS, True
+
+
 # -- one solution at most ----------------------------------------------------------------------------------------------
 
 
 @dataclass(frozen=True, eq=False)
-class Closed(ClosingRecord):
+class Closed(Record):
     """With an enclosure, or a count of 1, that solution is a root, else it is none.
 
     Attributes
@@ -281,7 +279,7 @@ class Closed(ClosingRecord):
     enclosure : EnclosureRecord or None
     """
 
-    kind, sizes, trees = "m", (5, 7), Tree.PLANE
+    kind, sizes, trees, closing = "m", (5, 7), Tree.PLANE, True
 
     selection: Codes
     free: Codes
@@ -321,7 +319,7 @@ class Closed(ClosingRecord):
 
 
 @dataclass(frozen=True, eq=False)
-class Alone(ClosingRecord):
+class Alone(Record):
     """Below the assignment there is this solution only, or in 3D none; in 3D it may lie beyond its sectors.
 
     Attributes
@@ -332,7 +330,7 @@ class Alone(ClosingRecord):
     strengths, terms : arrays, as ``trusted.uniqueness.lone_root`` takes them; None in 3D
     """
 
-    kind, sizes, trees = "a", (6, 9), Tree.PLANE | Tree.SPACE
+    kind, sizes, trees, closing = "a", (6, 9), Tree.PLANE | Tree.SPACE, True
 
     selection: Codes
     numbers: Floats
@@ -364,7 +362,7 @@ class Alone(ClosingRecord):
     def holds(self, system: EnclosedSystem, codes: Codes, errors: float = 1.0, near: Floats | None = None) -> Any:
         """The only solution below the assignment, None where that is not proven (theory, sections 6.13 and 12.6).
 
-        A VerifiedSelection; in 3D a SpaceRoot, or an OnlySolution where no leaf is named, near these normal forces, by
+        A VerifiedSelection; in 3D a SpaceRoot, or a LooseSolution where no leaf is named, near these normal forces, by
         default those of the enclosure. ``errors`` as of Excluded.
         """
         if self.strengths is not None and self.terms is not None:
@@ -372,10 +370,8 @@ class Alone(ClosingRecord):
         from enumsol.trusted.space import space_uniqueness as space  # in 3D only
 
         given = cast("EnclosedSpace", system)
-        if any(code != UNDECIDED for code in codes):
-            return space.lone_root(given, codes, self.numbers, self.selection, errors)
         if self.selection:
-            return space.only_root(given, self.numbers, self.selection, errors)
+            return space.lone_root(given, codes, self.numbers, self.selection, errors)
         if near is None:
             near = self.enclosure.numbers(len(system.g))[0][: len(codes)]
         return space.only_solution_in_space(given, self.numbers, near, errors)
@@ -388,7 +384,7 @@ class Alone(ClosingRecord):
 
 
 @dataclass(frozen=True, eq=False)
-class BoxedRoot(Solved):
+class BoxedRoot(Record):
     """All solutions of a complete assignment lie in a box that holds one solution.
 
     Attributes
@@ -397,7 +393,7 @@ class BoxedRoot(Solved):
     enclosure : EnclosureRecord
     """
 
-    kind, sizes, trees = "l", (7,), Tree.SPACE
+    kind, sizes, trees, final = "l", (7,), Tree.SPACE, True
 
     mid: Any
     rad: Any
@@ -416,8 +412,10 @@ class BoxedRoot(Solved):
 
 
 @dataclass(frozen=True, eq=False)
-class OnlyReference(ClosingRecord):
-    """No root but that of a form lies below the assignment; with an enclosure, in 2D, this one does.
+class OnlyReference(Record):
+    """No root but that of a form lies below the assignment; with an enclosure, at one alpha in 2D, this one does.
+
+    Over a piece of alpha in 2D: none beside the arcs of a form.
 
     Attributes
     ----------
@@ -430,7 +428,7 @@ class OnlyReference(ClosingRecord):
         In 3D, theta with which no other root is left at all; then there are no rows.
     """
 
-    kind, sizes, trees = "o", (4, 5, 7), Tree.FLOATING & Tree.POINTS
+    kind, sizes, trees, closing = "o", (4, 5, 7), (Tree.FLOATING & Tree.POINTS) | Tree.GRAPHS, True
 
     back: int
     rows: list[Any]
@@ -445,14 +443,14 @@ class OnlyReference(ClosingRecord):
         turns = None
         if limits.in_space and len(enclosure) == 1:
             turns = numbers_from(enclosure.pop(), limits.components - limits.p)
-        if len(enclosure) not in ((0,) if limits.in_space else (0, 3)):
+        if len(enclosure) not in ((0, 3) if limits.tree & Tree.FLOATING_PLANE else (0,)):
             raise RecordError(cls.unfit.format(len(entries) + 1, 4))
         if type(back) is not int or not 0 < back <= len(limits.declared):
             raise RecordError("its form is not declared")
         if not all(isinstance(value, list) for value in (rows, products)):
             raise RecordError("its rows are not a list")
-        if turns is not None and (rows or products):
-            raise RecordError("it has rows beside theta")
+        if (turns is not None or limits.held) and (rows or products):
+            raise RecordError("it has rows beside theta" if limits.in_space else "it has rows, of a body that is held")
         if not all(isinstance(product, list) and len(product) == 3 for product in products):
             raise RecordError("its products are not pairs of rows with a factor")
         factors = numbers_from([factor for *_, factor in products], len(products)).tolist()
@@ -486,16 +484,16 @@ class OnlyReference(ClosingRecord):
 
 # -- trees -------------------------------------------------------------------------------------------------------------
 
-_AT_POINTS: tuple[type[Record], ...] = (
+_LEAVES: tuple[type[Record], ...] = (
     *(Excluded, Unbalanced, NoRoot, RegularRoot, SharedRoot, RootSetRecord),
-    *(Closed, Alone, BoxedRoot, OnlyReference, Unloaded, UndecidedRecord),
+    *(Closed, Alone, BoxedRoot, OnlyReference, Unloaded, UndecidedRecord, Survivor, CutPiece),
 )
 
 
 @cache
 def leaves_of(tree: Tree) -> dict[str, type[Any]]:
     """The kinds of leaves whose theorems hold in a tree, by their letters."""
-    every = _AT_POINTS
+    every = _LEAVES
     if tree & Tree.PIECES:
         from enumsol.proof.curve_records import OnCurve, ThroughCurveBox  # for graphs in 3D only
 

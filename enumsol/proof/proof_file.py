@@ -36,7 +36,8 @@ from enumsol.support.messages import html_lines
 MAGIC = b"enumsol-proof 2\n"
 #: Version of the format, as headers have it.
 PROOF_VERSION = 2
-_DIGEST = 32
+#: Bytes of the digest at the end.
+DIGEST = 32
 _CHUNK = 1 << 16
 #: Most characters that a byte of a file may stand for. The level at which proofs are written does not go beyond 1 : 230
 #: even for one character repeated; a file that does was made to be expanded.
@@ -44,14 +45,10 @@ EXPANSION = 256
 #: Longest record, in sizes of its file. A record is long by its multipliers, the digits of its points or the codes of
 #: its subtrees, none of which compress that far.
 RECORD_SHARE = 16
-#: Longest record of all.
-LONGEST_RECORD = 1 << 26
 #: Characters that the smallest file may hold; its few records may compress far.
 SMALL = 1 << 16
 #: In the bits of a double, half a unit of the upper 32 of them, and these.
 _HALF, _UPPER = np.uint64(1 << 31), np.uint64(0xFFFFFFFF << 32)
-#: Digits of a whole number and its sign; codes, exponents and counts have fewer.
-_WHOLE_DIGITS = 18
 
 
 class ProofFormatError(EnumsolError, ValueError):
@@ -186,7 +183,7 @@ class Proof:
                     f"proof {self._name} is not a proof file; expected it to begin with 'enumsol-proof'"
                 )
             digest = hashlib.sha256(start)
-            left = size - len(MAGIC) - _DIGEST
+            left = size - len(MAGIC) - DIGEST
             while left > 0 and (chunk := file.read(min(_CHUNK, left))):
                 digest.update(chunk)
                 left -= len(chunk)
@@ -204,7 +201,7 @@ class Proof:
         with self._open() as file:
             size = file.seek(0, io.SEEK_END)
             file.seek(len(MAGIC))
-            for line in lines_of(_expanded(file, size), size):
+            for line in lines_of(expanded(file, size), size):
                 yield decoded(line)
 
     def __repr__(self) -> str:
@@ -222,13 +219,13 @@ def _reason(error: Exception) -> str:
     return error.strerror if isinstance(error, OSError) and error.strerror else str(error)
 
 
-def _expanded(file: BinaryIO, size: int) -> Iterator[bytes]:
-    """The decompressed stream in parts of at most _CHUNK bytes; ``file`` stands at its beginning."""
+def expanded(file: BinaryIO, size: int, chunk_size: int = _CHUNK) -> Iterator[bytes]:
+    """The decompressed stream in parts of at most _CHUNK bytes, read in chunks; ``file`` stands at its beginning."""
     inflate = zlib.decompressobj()
-    left = size - len(MAGIC) - _DIGEST
+    left = size - len(MAGIC) - DIGEST
     total, most = 0, EXPANSION * size + SMALL
     while left > 0 and not inflate.eof:
-        chunk = file.read(min(_CHUNK, left))
+        chunk = file.read(min(chunk_size, left))
         left -= len(chunk) or left
         full = True
         # a part that is not full has all that the chunk gives
@@ -250,7 +247,7 @@ def _expanded(file: BinaryIO, size: int) -> Iterator[bytes]:
 
 def lines_of(parts: Iterable[bytes], size: int) -> Iterator[bytes]:
     """The lines of a stream, the last one ended too."""
-    longest = min(LONGEST_RECORD, RECORD_SHARE * size + SMALL)
+    longest = min(1 << 26, RECORD_SHARE * size + SMALL)
     begun: list[bytes] = []
     length = 0
     for part in parts:
@@ -282,7 +279,8 @@ def _check_length(length: int, longest: int) -> None:
 
 
 def _whole(text: str) -> int:
-    if len(text) > _WHOLE_DIGITS:
+    # codes, exponents and counts have fewer digits
+    if len(text) > 18:
         raise ValueError(f"a whole number has {len(text)} digits")
     return int(text)
 

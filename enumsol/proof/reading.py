@@ -24,15 +24,13 @@ if TYPE_CHECKING:
     from collections.abc import Collection, Iterable, Sequence
 
     from enumsol.model.problem3d import AnyProblem
-    from enumsol.support.array_types import Codes, Floats, NDArray
+    from enumsol.support.array_types import Codes, Floats
 
     #: A row in 3D: its kind, its node, and the number of a direction or sector.
     Row = tuple[int, int, int]
 
 #: Most digits of the numerator and of the denominator of a fraction.
 MOST_DIGITS = 4000
-#: Least and largest binary exponent of a unit.
-LEAST_EXPONENT, LARGEST_EXPONENT = -900, 900
 
 _SLIDING = FORWARD, BACKWARD
 #: Codes that are not final.
@@ -163,11 +161,7 @@ def units_from(header: dict[str, Any], p: int, *, by_node: bool = False) -> tupl
 
 def exponents_from(value: object, size: int) -> list[int]:
     """``size`` binary exponents of units."""
-    if not (
-        isinstance(value, list)
-        and len(value) == size
-        and all(type(x) is int and LEAST_EXPONENT <= x <= LARGEST_EXPONENT for x in value)
-    ):
+    if not (isinstance(value, list) and len(value) == size and all(type(x) is int and -900 <= x <= 900 for x in value)):
         raise ValueError(f"the units are not {size} binary exponents")
     return value
 
@@ -211,19 +205,6 @@ def numbers_from(values: object, size: int) -> Floats:
     if not np.all(np.isfinite(numbers)):
         raise ValueError("a number is not finite")
     return numbers
-
-
-def codes_from(texts: object, p: int, most: int = UNDECIDED) -> NDArray[np.uint8]:
-    """Status codes up to ``most``, (k, p), from k texts of p digits each."""
-    if not isinstance(texts, list) or not all(isinstance(text, str) and len(text) == p for text in texts):
-        raise ValueError(f"expected status codes as texts of {p} digits")
-    joined = "".join(texts)
-    if not joined.isascii():
-        raise ValueError("a status code is not a digit")
-    codes = np.frombuffer(joined.encode("ascii"), dtype=np.uint8) - np.uint8(ord("0"))
-    if np.any(codes > most):
-        raise ValueError(f"a status code is not among 0 to {most}")
-    return codes.reshape(-1, p)
 
 
 def check_complete(codes: Codes) -> None:

@@ -2,9 +2,8 @@
 
 A record is a class: a search writes it, and the checker, and a search that resumes from an earlier proof, read it
 strictly. Reading says whether a record makes sense, never that it is true. docs/proof_format.md says what each of them
-claims and how that is tested. Leaves are in ``proof.leaves``, what stands in trees over pieces of alpha only in
-``proof.curve_records``; docs/architecture.md lists the other places that a new kind of leaf touches. Records of graphs
-in 2D have no classes (see ``branches.proof_records``).
+claims and how that is tested. Leaves are in ``proof.leaves``, what stands in trees over pieces of alpha in 3D only in
+``proof.curve_records``; docs/architecture.md lists the other places that a new kind of leaf touches.
 """
 
 from __future__ import annotations
@@ -17,13 +16,24 @@ from typing import TYPE_CHECKING, Any, ClassVar, cast
 import numpy as np
 
 from enumsol.arithmetic.balls import SAFE
-from enumsol.proof.reading import RecordError, is_code_of_leaf, numbers_from, quoted, selection_from
+from enumsol.proof.reading import (
+    RecordError,
+    check_complete,
+    is_code_of_leaf,
+    numbers_from,
+    quoted,
+    rational_from,
+    selection_from,
+)
 from enumsol.support.array_types import Codes, Floats
+from enumsol.trusted.over_interval import EnclosedPiece
 from enumsol.trusted.quadratic_forms import EnclosedForm
 from enumsol.trusted.reference import Reference
 from enumsol.trusted.status_rows import UNDECIDED, refines
 
 if TYPE_CHECKING:
+    from fractions import Fraction
+
     from enumsol.arithmetic.balls import Ball
     from enumsol.condensation.enclosure import EnclosedSystem
     from enumsol.condensation.space_condensed import EnclosedSpace
@@ -33,15 +43,16 @@ _SUBNORMAL = 2.0**-1070
 
 
 class Tree(Flag):
-    """Trees of a proof: at one alpha in 2D and in 3D, and over an interval in 3D, of bodies held and not."""
+    """Trees of a proof: at one alpha in 2D and in 3D, over pieces of alpha in both, of bodies held and not."""
 
-    PLANE, SPACE, PIECE = auto(), auto(), auto()
-    FLOATING_PLANE, FLOATING_SPACE, FLOATING_PIECE = auto(), auto(), auto()
+    PLANE, SPACE, GRAPH, PIECE = auto(), auto(), auto(), auto()
+    FLOATING_PLANE, FLOATING_SPACE, FLOATING_GRAPH, FLOATING_PIECE = auto(), auto(), auto(), auto()
     #: Bodies with a stiffness that is positive definite, on which most theorems rest.
-    HELD = PLANE | SPACE | PIECE
-    FLOATING = FLOATING_PLANE | FLOATING_SPACE | FLOATING_PIECE
-    #: Problems in 3D; trees over pieces of alpha; trees at one alpha.
+    HELD = PLANE | SPACE | GRAPH | PIECE
+    FLOATING = FLOATING_PLANE | FLOATING_SPACE | FLOATING_GRAPH | FLOATING_PIECE
+    #: Problems in 3D; trees over pieces of alpha in 2D, and in 3D; trees at one alpha.
     IN_SPACE = SPACE | PIECE | FLOATING_SPACE | FLOATING_PIECE
+    GRAPHS = GRAPH | FLOATING_GRAPH
     PIECES = PIECE | FLOATING_PIECE
     POINTS = PLANE | SPACE | FLOATING_PLANE | FLOATING_SPACE
 
@@ -86,8 +97,8 @@ class Limits:
 
     def check_form(self, back: Any) -> None:
         """Raise RecordError unless a form that serves the assignment was declared so many before."""
-        known = self.tree & (Tree.PLANE | Tree.SPACE) and type(back) is int and 1 <= back <= len(self.declared)
-        if not known:
+        by_form = Tree.PLANE | Tree.SPACE | Tree.GRAPH
+        if not (self.tree & by_form and type(back) is int and 1 <= back <= len(self.declared)):
             raise RecordError("its form was not declared")
         if not self.declared[-back].serves(self.codes):
             raise RecordError("its form was made for another assignment")
@@ -103,16 +114,24 @@ class Record:
     sizes : how many entries a record may have
     unfit : what is said where it has another number of them
     trees : where its theorem holds
+    final : bool
+        It stands at complete assignments only.
+    closing : bool
+        There can be one solution only below it.
     """
 
     kind: ClassVar[str]
     sizes: ClassVar[tuple[int, ...]]
     unfit: ClassVar[str] = "its record has {} entries; expected {}"
     trees: ClassVar[Tree] = Tree.HELD | Tree.FLOATING
+    final: ClassVar[bool] = False
+    closing: ClassVar[bool] = False
 
     @classmethod
     def read(cls, record: list[Any], limits: Limits) -> Any:
         """A record of this kind; ValueError where it makes no sense."""
+        if cls.final:
+            check_complete(limits.codes)
         if len(record) not in cls.sizes:
             raise RecordError(cls.unfit.format(len(record), " or ".join(map(str, cls.sizes))))
         return cls.of(record[1:], limits)
@@ -134,10 +153,6 @@ class Record:
                 yield from value
             elif value is not None:
                 yield value.ravel() if isinstance(value, np.ndarray) else value
-
-
-class ClosingRecord(Record):
-    """Base of leaves below which there can be one solution only."""
 
 
 # -- branchings and forms ----------------------------------------------------------------------------------------------
@@ -165,6 +180,28 @@ class Branching(Record):
     def below(self, codes: Codes) -> list[Codes]:
         """The assignments into which it splits one."""
         return [(*codes[: self.node], code, *codes[self.node + 1 :]) for code in self.children]
+
+
+@dataclass(frozen=True)
+class CutPiece(Record):
+    """The piece of alpha is cut here.
+
+    The subtrees of both parts follow, the lower one first; in 2D after all trees over the piece, which is halved.
+    """
+
+    kind, sizes, trees = "p", (2,), Tree.PIECES | Tree.GRAPHS
+
+    alpha: str
+
+    def between(self, low: Fraction, high: Fraction) -> Fraction:
+        """Alpha of the cut; RecordError where it is not within the piece."""
+        try:
+            alpha = rational_from(self.alpha)
+        except ValueError as error:
+            raise RecordError(f"a piece is cut nowhere: {error}") from None
+        if not low < alpha < high:
+            raise RecordError("a piece is not cut within")
+        return alpha
 
 
 @dataclass(frozen=True, eq=False)
@@ -205,24 +242,25 @@ NOWHERE = EnclosureRecord(None, None, None)
 
 @dataclass(frozen=True, eq=False)
 class DeclaredForm(Record):
-    """A form to which later leaves refer: of an assignment, or of a root of a body that nothing holds.
+    """A form to which later leaves refer: of an assignment, of a root of a body that nothing holds, or of arcs.
 
     Attributes
     ----------
     codes : of the assignment for which it is made, or of the leaf that holds the root
+        Of arcs over a piece in 2D, a tuple of their selections.
     numbers : array
         For a body that is held, in 2D the four rows of its multipliers one after the other, in 3D those of
         ``sector_margins.SlipForm``, over the whole tree. For other bodies those of ``trusted.reference.Reference`` or
-        ``trusted.space.space_uniqueness.LeafReference``.
+        ``trusted.space.space_uniqueness.LeafReference``. Of arcs mu, kappa and nu of ``PieceNumbers``.
     more : array
-        In 2D the weight of the equations; of a root balance and share.
+        At one alpha in 2D the weight of the equations; of a root balance and share, of arcs the degree, too.
     enclosure : EnclosureRecord or None
         Of the root, in 3D.
     """
 
     kind, sizes, unfit = "q", (4, 7), "a form has {} entries; expected {}"
 
-    codes: Codes
+    codes: tuple[Any, ...]
     numbers: Floats
     more: Floats
     enclosure: EnclosureRecord | None = None
@@ -238,17 +276,26 @@ class DeclaredForm(Record):
             given = numbers_from(numbers, count), numbers_from(more, further)
         except ValueError as error:
             raise ValueError(f"a form cannot be read: {error}") from None
-        if limits.tree & Tree.PLANE and (np.any(given[0][2 * limits.p :] < 0) or given[1][0] < 0):
+        chosen = tuple(tuple(code) if isinstance(code, list) else code for code in codes)
+        found = cls(chosen, *given, EnclosureRecord(*enclosure) if enclosure else None)
+        in_plane = limits.tree & (Tree.PLANE | Tree.GRAPH) and not found.of_arcs
+        if in_plane and (np.any(given[0][2 * limits.p :] < 0) or np.any(given[1] < 0)):
             raise ValueError("a multiplier of a form is negative and must not be")
-        return cls(tuple(codes), *given, EnclosureRecord(*enclosure) if enclosure else None)
+        return found
 
     @staticmethod
     def _counts(codes: object, numbers: object, limits: Limits) -> tuple[int, int]:
         """Counts of numbers of both kinds, for codes that a form may have."""
+        if limits.tree & Tree.GRAPHS and isinstance(codes, list) and codes and isinstance(codes[0], list):
+            for selection in codes:
+                selection_from(selection, limits.friction)
+            return 3 * limits.p, 0 if limits.held else 3
         if not isinstance(codes, list) or len(codes) != limits.p or not all(type(code) is int for code in codes):
             raise ValueError(f"its codes are not a list of {limits.p} codes")
         whole = all(code == UNDECIDED for code in codes)
-        if not limits.in_space:
+        if limits.tree & Tree.GRAPH and whole:
+            return 4 * limits.p, 0
+        if limits.tree & (Tree.PLANE | Tree.FLOATING_PLANE):
             if limits.held:
                 if not all(0 <= code <= UNDECIDED for code in codes):
                     raise ValueError(f"a status code is not among 0 to {UNDECIDED}")
@@ -264,21 +311,30 @@ class DeclaredForm(Record):
         pairs = (self.numbers, other.numbers), (self.more, other.more)
         return self.codes == other.codes and all(np.array_equal(*pair) for pair in pairs)
 
+    @property
+    def of_arcs(self) -> bool:
+        """True for a form of arcs."""
+        return isinstance(self.codes[0], tuple)
+
     def serves(self, codes: Sequence[int]) -> bool:
         """True if a partial assignment is part of the one that this form is made for."""
-        return all(mine == UNDECIDED or refines(code, mine) for code, mine in zip(codes, self.codes, strict=True))
+        pairs = zip(codes, self.codes, strict=True)
+        return not self.of_arcs and all(mine == UNDECIDED or refines(code, mine) for code, mine in pairs)
 
     @np.errstate(over="ignore", invalid="ignore")
-    def form(self, system: EnclosedSystem) -> Any:
+    def form(self, system: EnclosedSystem | EnclosedPiece) -> Any:
         """The form of an assignment, or of a root; None where it is not proven to be definite.
 
-        An EnclosedForm or Reference, in 3D a SlipForm (of the whole tree) or LeafReference.
+        An EnclosedForm or Reference, over a piece the piece with it, in 3D a SlipForm (of the whole tree) or
+        LeafReference. Numbers of arcs are those of a ``PieceNumbers``.
 
         Raises
         ------
         ValueError
             A multiplier is not allowed.
         """
+        if isinstance(system, EnclosedPiece):
+            return system.with_form(self.numbers.reshape(4, -1))
         if system.tangents == 1:
             if not system.held:
                 return Reference.of(system, self.codes, self.numbers, *self.more.tolist())

@@ -66,13 +66,13 @@ def certificate_from(record: list[Any], k: int) -> Growing | NoMotion:
     if len(record) != 10:
         raise ValueError(f"{quoted(record)} is not about a range in which nothing grows")
     _, _, low, high, beside, slides, stays, weights, first, last = record
-    ends = [*numbers_from([low], 1).tolist(), *(_perhaps(value) for value in (high, beside))]
+    ends = [None if value is None else float(numbers_from([value], 1)[0]) for value in (high, beside)]
     zero = np.zeros((k, k))
     products = _matrix(first, k, zero), _matrix(last, k, zero)
     return NoMotion(
-        ends[0],
-        math.inf if ends[1] is None else ends[1],
-        ends[2],
+        float(numbers_from([low], 1)[0]),
+        math.inf if ends[0] is None else ends[0],
+        ends[1],
         _indices(slides, k),
         _indices(stays, k),
         _matrix(weights, k, np.eye(k)),
@@ -102,10 +102,6 @@ def _matrix(entries: object, k: int, usual: Floats) -> Floats:
         before = i * k + j
         matrix[i, j] = numbers_from([value], 1)[0]
     return matrix
-
-
-def _perhaps(value: object) -> float | None:
-    return None if value is None else float(numbers_from([value], 1)[0])
 
 
 def _indices(values: object, k: int) -> tuple[int, ...]:

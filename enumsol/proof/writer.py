@@ -1,7 +1,8 @@
-"""Proofs as they are written: streamed, and readable up to the last records should the program be killed.
+"""Proofs as they are written: streamed, readable up to the last records should the program be killed; and resumed.
 
 Records are encoded to parts of the zlib stream of a proof, which are made anywhere and put together without a look
-inside.
+inside. Nothing in a proof that was begun is trusted: it may end in the middle of a record, and whoever uses a record
+proves it again.
 """
 
 from __future__ import annotations
@@ -9,9 +10,11 @@ from __future__ import annotations
 import contextlib
 import hashlib
 import io
+import itertools
 import json
 import os
 import zlib
+from collections.abc import Iterator
 from dataclasses import dataclass
 from fractions import Fraction
 from pathlib import Path
@@ -19,8 +22,11 @@ from typing import TYPE_CHECKING, Any, BinaryIO, Protocol
 
 import numpy as np
 
-from enumsol.proof.proof_file import MAGIC, PROOF_VERSION, Proof
-from enumsol.proof.reading import rational_text
+from enumsol.errors import InvalidArgumentError
+from enumsol.proof.leaves import UndecidedRecord
+from enumsol.proof.proof_file import DIGEST, MAGIC, PROOF_VERSION, Proof, ProofFormatError, decoded, expanded, lines_of
+from enumsol.proof.reading import quoted, rational_text, same
+from enumsol.proof.records import DeclaredForm
 from enumsol.support.files import check_replaceable, writing
 
 if TYPE_CHECKING:
@@ -330,3 +336,104 @@ def point_header(
 def unit_exponents(force: Floats, length: Floats) -> dict[str, list[int]]:
     """Binary exponents of the units of forces and displacements, powers of two."""
     return {name: (np.frexp(units)[1] - 1).tolist() for name, units in (("force", force), ("length", length))}
+
+
+#: Bytes that are expanded at once: what is lost before a damaged place.
+_CHUNK = 512
+#: How an undecided leaf and the footer begin: what needs no proof, and is found out anew.
+_OPEN = (f'["{UndecidedRecord.kind}"'.encode(), b"{")
+#: How a form begins, which is no node of the tree.
+_FORM = f'["{DeclaredForm.kind}"'.encode()
+
+
+class BegunProof:
+    """A proof file as far as it goes.
+
+    Parameters
+    ----------
+    place : Path
+
+    Raises
+    ------
+    InvalidArgumentError
+        The file cannot be read, or is no proof of this version.
+    """
+
+    def __init__(self, place: Path) -> None:
+        self._place = place
+        try:
+            with place.open("rb") as file:
+                start = file.read(len(MAGIC))
+        except OSError as error:
+            raise _refusal(place, f"cannot be read ({error.strerror or error})") from error
+        if not MAGIC.startswith(start):
+            other = start.startswith(b"enumsol-proof ")
+            raise _refusal(place, f"is of another version ({start!r})" if other else "is not a proof")
+
+    def header(self) -> Any:
+        """The first record; None if the file does not go so far."""
+        return next(self._records(), None)
+
+    def records(self) -> Iterator[Any]:
+        """Records after the header, up to the last one that is whole."""
+        return itertools.islice(self._records(), 1, None)
+
+    def extent(self) -> tuple[int, int, int]:
+        """Extent of the file: records that a replacement must hold, nodes of the tree, and those that are undecided.
+
+        The first are all records after the header up to the last that is proven.
+        """
+        needed = nodes = undecided = 0
+        for number, line in enumerate(itertools.islice(self._lines(), 1, None), start=1):
+            if not line.startswith(_OPEN):
+                needed = number
+            nodes += line.startswith(b"[") and not line.startswith(_FORM)
+            undecided += line.startswith(_OPEN[0])
+        return needed, nodes, undecided
+
+    def _records(self) -> Iterator[Any]:
+        with contextlib.suppress(ProofFormatError):
+            yield from map(decoded, self._lines())
+
+    def _lines(self) -> Iterator[bytes]:
+        size = self._place.stat().st_size
+        # the last line may not be whole, and no digest may stand at the end
+        with self._place.open("rb") as file, contextlib.suppress(ProofFormatError):
+            file.seek(len(MAGIC))
+            yield from lines_of(expanded(file, size + DIGEST, _CHUNK), size)
+
+
+def begun_proof(place: Path, header: dict[str, Any]) -> BegunProof | None:
+    """The proof in a file from which a search with this header resumes; None if there is nothing in it yet.
+
+    Raises
+    ------
+    InvalidArgumentError
+        It is a file of something else; it says what.
+    """
+    if not place.exists():
+        return None
+    begun = BegunProof(place)
+    found = begun.header()
+    if found is None:
+        return None
+    if not isinstance(found, dict) or found.get("format") != header["format"]:
+        raise _refusal(place, "is not a proof")
+    if not same(found.get("kind", ()), header.get("kind", ())):
+        raise _refusal(place, f"is a proof of another kind, {quoted(found.get('kind', 'point'))}")
+    for name, words in _NAMES.items():
+        if not same(found.get(name), header[name]):
+            raise _refusal(
+                place, f"belongs to another {words} ({quoted(found.get(name))}; here {quoted(header[name])})"
+            )
+    if not same(found, header):
+        raise _refusal(place, "was written with other units of force and length")
+    return begun
+
+
+#: What must agree, in the order in which it is looked at.
+_NAMES = {"version": "version", "problem": "problem", "alpha": "alpha", "p": "number of contact nodes", "data": "data"}
+
+
+def _refusal(place: Path, what: str) -> InvalidArgumentError:
+    return InvalidArgumentError(f"proof_path {place} {what}; expected the proof of this search, to be resumed")

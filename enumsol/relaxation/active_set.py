@@ -28,13 +28,17 @@ from enumsol.errors import InvalidProblemError, MissingDependencyError
 from enumsol.model.statuses import CONDITIONS, SLIP_MINUS, SLIP_PLUS, UNDECIDED, RowKind
 from enumsol.relaxation.engine import (
     BRANCHING_CANDIDATES,
+    EQUALITY,
     FEASIBILITY_TOLERANCE,
+    INEQUALITY,
     PRUNE_MARGIN,
     Relaxation,
     not_compiled,
+    row_terms,
+    status_rows,
 )
-from enumsol.relaxation.imposed_rows import EQUALITY, INEQUALITY, row_terms, status_rows
 from enumsol.support.array_types import Alpha, Codes, Floats, Indices, NDArray
+from enumsol.trusted.quadratic_forms import multiplied
 
 if TYPE_CHECKING:
     from enumsol.relaxation._active_set import BranchingRule, QPData, QPState
@@ -153,20 +157,12 @@ class PieceForm:
     @classmethod
     def of(cls, system: IntervalSystem, multipliers: Floats) -> PieceForm | None:
         """The form of four multipliers per node, (4, p), with F_lo in place of F; None where it is hardly convex."""
-        p = system.p
-        mu, nu, alpha, beta = multipliers
-        left, right = np.concatenate([mu, nu]), np.concatenate([system.F_lo * (beta - alpha), alpha + beta])
-
-        def combined(rows: Floats) -> Floats:
-            """D' applied to rows."""
-            normal, tangential = np.concatenate([rows[:p]] * 2), np.concatenate([rows[p:]] * 2)
-            return np.asarray((left * normal.T + right * tangential.T).T)
-
-        turned = combined(system.S)
+        turned = multiplied(system.S, system.F_lo, multipliers)
         H = 0.5 * (turned + turned.T)
         if factor_above(H, 1e-9 * float(np.mean(np.diagonal(H)))) is None:
             return None
-        return cls(H, combined(system.g), combined(system.half))
+        loads = multiplied(np.column_stack([system.g, system.half]), system.F_lo, multipliers)
+        return cls(H, loads[:, 0].copy(), loads[:, 1].copy())
 
     def convex(self) -> Floats:
         """Matrix of the convex form in (lambda, tau), shape (2p + 1, 2p + 1).

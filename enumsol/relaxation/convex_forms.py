@@ -20,10 +20,10 @@ from scipy.linalg import cho_factor, cho_solve, qr, solve_triangular
 
 from enumsol.arithmetic.balls import factor_above
 from enumsol.relaxation.active_set import ActiveSetRelaxation
-from enumsol.relaxation.imposed_rows import row_normals
+from enumsol.relaxation.engine import row_normals
 from enumsol.relaxation.space_relaxation import SpaceRelaxation
 from enumsol.support.deadlines import look
-from enumsol.trusted.quadratic_forms import EnclosedForm, Equations
+from enumsol.trusted.quadratic_forms import EnclosedForm, equations_of
 from enumsol.trusted.space.sector_margins import SlipForm
 from enumsol.trusted.space.sector_rows import sector_row_terms
 from enumsol.trusted.status_rows import CONTACT, UNDECIDED
@@ -55,10 +55,6 @@ class _Candidate(Generic[_Form, _Relaxation]):
     form: _Form
     factor: Floats
     relaxation: _Relaxation
-
-    @property
-    def log_determinant(self) -> float:
-        return 2.0 * float(np.sum(np.log(np.diagonal(self.factor))))
 
 
 class FormAscent(ABC, Generic[_Form, _Relaxation]):
@@ -125,7 +121,8 @@ class FormAscent(ABC, Generic[_Form, _Relaxation]):
         step, promised = newton
 
         def merit(candidate: _Candidate[_Form, _Relaxation]) -> float:
-            barriers = candidate.log_determinant + _BARRIER * self._barrier(candidate.multipliers)
+            log_determinant = 2.0 * float(np.sum(np.log(np.diagonal(candidate.factor))))
+            barriers = log_determinant + _BARRIER * self._barrier(candidate.multipliers)
             return scale * candidate.relaxation.bound + barriers
 
         length = 1.0
@@ -194,7 +191,7 @@ class PlaneFormAscent(FormAscent[EnclosedForm, ActiveSetRelaxation]):
         self._scaled, self._enclosed, self._engine, self._codes, self._rows = scaled, enclosed, engine, codes, rows
         self.S, self.g = scaled.S, scaled.g
         p, status = scaled.p, np.asarray(codes)
-        a = Equations.of(enclosed, codes).a
+        a = equations_of(enclosed, codes)[0].mid
         self.across = _complement(a) if len(a) else np.eye(2 * p)
         normal = status == UNDECIDED
         tangential = (normal | (status == CONTACT)) & (scaled.F > 0)

@@ -9,8 +9,7 @@ import scipy.sparse as sp
 from scipy.linalg import solve_triangular
 
 from enumsol.model.statuses import CONTACT, UNDECIDED
-from enumsol.relaxation.engine import PRUNE_MARGIN, Relaxation
-from enumsol.relaxation.imposed_rows import EQUALITY, row_terms
+from enumsol.relaxation.engine import EQUALITY, PRUNE_MARGIN, Relaxation, row_terms
 from enumsol.support.conic import conic_answer
 
 if TYPE_CHECKING:
@@ -119,7 +118,14 @@ class _InteriorPointRelaxation:
 
     def choose(self, codes: Codes) -> int:
         """The undecided node at which complementarity is violated most, -1 when all are decided."""
-        return largest_violation(codes, self._engine.system.F, self.forces, self.displacements)
+        F, forces, w, array = self._engine.system.F, self.forces, self.displacements, np.array(codes)
+        open_nodes, p = np.flatnonzero((array == CONTACT) | (array == UNDECIDED)), len(F)
+        if not len(open_nodes):
+            return -1
+        slip = F * forces[:p] * np.abs(w[p:]) - forces[p:] * w[p:]
+        # an undecided node's slip counts double: deciding it now saves the slack that it leaves in the energy
+        score = np.where(array == UNDECIDED, slip - forces[:p] * w[:p], 0.0) + slip
+        return int(open_nodes[np.argmax(score[open_nodes])])
 
     def forced(self, codes: Codes) -> tuple[int, ...]:
         """None: this method bounds a child only by solving it."""
@@ -128,15 +134,3 @@ class _InteriorPointRelaxation:
     def child(self, rows: list[int], modes: list[int], *, last: bool) -> Relaxation:
         """The relaxation with further rows switched on, solved from scratch."""
         return self._engine.solved(self._on | dict(zip(rows, modes, strict=True)))
-
-
-def largest_violation(codes: Codes, F: Floats, forces: Floats, w: Floats) -> int:
-    """The undecided node at which complementarity is violated most, -1 when all are decided."""
-    array, p = np.array(codes), len(F)
-    open_nodes = np.flatnonzero((array == CONTACT) | (array == UNDECIDED))
-    if not len(open_nodes):
-        return -1
-    slip = F * forces[:p] * np.abs(w[p:]) - forces[p:] * w[p:]
-    # an undecided node's slip counts double: deciding it now saves the slack that it leaves in the energy
-    score = np.where(array == UNDECIDED, slip - forces[:p] * w[:p], 0.0) + slip
-    return int(open_nodes[np.argmax(score[open_nodes])])

@@ -13,8 +13,7 @@ import numpy as np
 from enumsol.errors import MissingDependencyError
 from enumsol.model.sectors import SECTORS, cut, end_number, middle_number, nearest, start_number, width_level, width_of
 from enumsol.model.statuses import CONTACT, OPEN, SLIP_MINUS, SLIP_PLUS, STICK, UNDECIDED
-from enumsol.relaxation.engine import FEASIBILITY_TOLERANCE, PRUNE_MARGIN, not_compiled
-from enumsol.relaxation.imposed_rows import EQUALITY, INEQUALITY
+from enumsol.relaxation.engine import EQUALITY, FEASIBILITY_TOLERANCE, INEQUALITY, PRUNE_MARGIN, not_compiled
 from enumsol.trusted.space import sector_rows
 
 if TYPE_CHECKING:

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 from enumsol.branches import BranchGraph
 from enumsol.errors import InvalidArgumentError
 from enumsol.loading.history import History
-from enumsol.report import graph_page, history_page, roots_page
+from enumsol.report import graph_page, roots_page
 from enumsol.report.parts import Heading
 from enumsol.roots.root_set import RootSet
 from enumsol.support.arguments import file_path, instance_of
@@ -90,7 +90,7 @@ def write_report(
     pages: dict[type, Callable[..., str]] = {
         BranchGraph: graph_page.graph_page,
         RootSet: roots_page.roots_page,
-        History: history_page.history_page,
+        History: roots_page.history_page,
     }
     page = next((page for kind, page in pages.items() if isinstance(solutions, kind)), None)
     if page is None:

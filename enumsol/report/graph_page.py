@@ -14,21 +14,7 @@ from enumsol.branches.figures.curves import QUANTITIES, Curve, curves, side_by_s
 from enumsol.branches.figures.panels import colour_of, family_states
 from enumsol.branches.graph_data import about_stability, branch_stability
 from enumsol.model.problem import ContactProblem
-from enumsol.report.parts import (
-    CERTIFIED_DATA,
-    DRAWING,
-    STATUS_NAMES,
-    Heading,
-    Statement,
-    body_record,
-    filled_page,
-    packed_plotly,
-    proof_commands,
-    span_words,
-    status_codes,
-    table_text,
-    with_unit,
-)
+from enumsol.report import parts
 from enumsol.support.messages import counted
 
 if TYPE_CHECKING:
@@ -37,20 +23,19 @@ if TYPE_CHECKING:
     from enumsol.branches import BranchGraph
     from enumsol.fem import Scene
     from enumsol.model.problem3d import ContactProblem3D
-    from enumsol.support.array_types import ArrayLike
 
 #: Most numbers of forces and displacements along the arcs, about ten characters each.
 _MOST_NUMBERS = 250_000
 
 
-def graph_page(graph: BranchGraph, heading: Heading) -> str:
+def graph_page(graph: BranchGraph, heading: parts.Heading) -> str:
     """The text of the page."""
     where = f" for {ranges_text(graph.open_ranges)}, and only there" if graph.claims.partly else ""
     incomplete = (
         f"This graph is not complete. Everything shown is a solution, but solutions may be missing{where}: numbers of "
         "solutions are lower bounds. Why:"
     )
-    said = Statement(
+    said = parts.Statement(
         incomplete if graph.reasons else "",
         graph.reasons,
         _facts(graph, heading.units),
@@ -60,11 +45,13 @@ def graph_page(graph: BranchGraph, heading: Heading) -> str:
         ],
         _certified(graph),
         graph.problem.fingerprint,
-        proof_commands("graph", "--from A --to B", "; the proof's first record holds the same fingerprint."),
+        parts.proof_commands("graph", "--from A --to B", "; the proof's first record holds the same fingerprint."),
     )
-    words = {"plotly": packed_plotly(), "branches": _branches(graph), "vertices": _vertices(graph)}
+    words = {"plotly": parts.packed_plotly(), "branches": _branches(graph), "vertices": _vertices(graph)}
     content = report_content(graph, heading.scene) | {"units": heading.units}
-    return filled_page("graph", graph, heading, said, (*DRAWING, "page.js", "page.solutions.js"), content, words)
+    return parts.filled_page(
+        "graph", graph, heading, said, (*parts.DRAWING, "page.js", "page.solutions.js"), content, words
+    )
 
 
 def _facts(graph: BranchGraph, units: tuple[str, str] | None) -> list[tuple[str, str]]:
@@ -76,8 +63,8 @@ def _facts(graph: BranchGraph, units: tuple[str, str] | None) -> list[tuple[str,
         ("degrees of freedom", f"{problem.n:,}"),
         ("combinations of statuses", _combinations(problem)),
         ("friction", _friction(problem)),
-        ("load", with_unit(f"{load}, max |f| = {np.max(np.abs(problem.f)):.4g}", units, 1, 0)),
-        ("gap", with_unit(span_words(problem.gap), units, 0, 1)),
+        ("load", parts.with_unit(f"{load}, max |f| = {np.max(np.abs(problem.f)):.4g}", units, 1, 0)),
+        ("gap", parts.with_unit(parts.span_words(problem.gap), units, 0, 1)),
         ("alpha", f"from {a:.10g} to {b:.10g}"),
         ("arithmetic", graph.arithmetic),
         ("found", f"{branches}, {arcs}, {counted(len(graph.folds), 'fold')}"),
@@ -94,10 +81,10 @@ def _combinations(problem: ContactProblem | ContactProblem3D) -> str:
 def _friction(problem: ContactProblem | ContactProblem3D) -> str:
     """The coefficients as functions of alpha."""
     if isinstance(problem, ContactProblem):
-        return f"F = {span_words(problem.friction)} + alpha {span_words(problem.friction_slope)}"
-    slopes = (f" + alpha {span_words(slope)}" if np.any(slope) else "" for slope in problem.friction_slope)
+        return f"F = {parts.span_words(problem.friction)} + alpha {parts.span_words(problem.friction_slope)}"
+    slopes = (f" + alpha {parts.span_words(slope)}" if np.any(slope) else "" for slope in problem.friction_slope)
     pairs = enumerate(zip(problem.friction, slopes, strict=True), 1)
-    return ", ".join(f"F{k} = {span_words(F)}{slope}" for k, (F, slope) in pairs)
+    return ", ".join(f"F{k} = {parts.span_words(F)}{slope}" for k, (F, slope) in pairs)
 
 
 def _branches(graph: BranchGraph) -> str:
@@ -113,7 +100,7 @@ def _branches(graph: BranchGraph) -> str:
     if not rows:
         return f"<p>None{'' if graph.complete else ' was found'}.</p>"
     heads = ("branch", "alpha from", "to", "shape", "arcs", "indices", "folds at")
-    return table_text("All branches", heads if graph.verdicts is None else (*heads, "stability"), rows)
+    return parts.table_text("All branches", heads if graph.verdicts is None else (*heads, "stability"), rows)
 
 
 def _vertices(graph: BranchGraph) -> str:
@@ -133,7 +120,9 @@ def _vertices(graph: BranchGraph) -> str:
         change = _change(graph, v, meeting[v.number])
         cells = (repr(v.alpha), error, v.kind.value, ", ".join(map(str, branches)), change)
         rows.append((f' data-alpha="{v.alpha!r}" tabindex="0"', cells))
-    return table_text("Critical alphas", ("alpha", "width of its bounds", "kind", "branches", "what happens"), rows)
+    return parts.table_text(
+        "Critical alphas", ("alpha", "width of its bounds", "kind", "branches", "what happens"), rows
+    )
 
 
 def _change(graph: BranchGraph, v: Vertex, arcs: Sequence[Any]) -> str:
@@ -151,7 +140,7 @@ def _change(graph: BranchGraph, v: Vertex, arcs: Sequence[Any]) -> str:
 
 
 def _certified(graph: BranchGraph) -> list[str]:
-    about = f"This is about {CERTIFIED_DATA[graph.certified_data]}."
+    about = f"This is about {parts.CERTIFIED_DATA[graph.certified_data]}."
     if graph.complete:
         known = f"every solution for every alpha of the interval lies on the arcs shown here. {about}"
     elif graph.claims.partly:
@@ -184,14 +173,14 @@ def report_content(graph: BranchGraph, scene: Scene | None = None) -> dict[str, 
     the contact nodes, all normal ones, then those along each tangent; of an arc at its points ``a``.
     """
     drawn, tolerance = _sampled(graph)
-    steps, (body, missing) = graph.claims.steps(), body_record(graph.problem, scene)
+    steps, (body, missing) = graph.claims.steps(), parts.body_record(graph.problem, scene)
     return {
         "interval": list(graph.interval),
         "complete": graph.complete,
         "exact_counts": steps.exact,
         "open_ranges": [[float(end) for end in ends] for ends in graph.open_ranges] if graph.claims.partly else [],
         "nodes": [str(label) for label in graph.problem.node_ids],
-        "statuses": STATUS_NAMES,
+        "statuses": parts.STATUS_NAMES,
         "tangents": 2 if _in_space(graph) else 1,
         "quantities": [item._asdict() for item in QUANTITIES.values()],
         "tolerance": tolerance,
@@ -212,15 +201,6 @@ def report_content(graph: BranchGraph, scene: Scene | None = None) -> dict[str, 
         "body": body,
         "no_body": missing,
     }
-
-
-def rounded_list(values: ArrayLike) -> Any:
-    """Numbers of an array to nine digits, as lists."""
-    array = np.asarray(values, dtype=np.float64)
-    if array.ndim:
-        return [rounded_list(row) for row in array]
-    number = float(f"{float(array):.9g}")
-    return int(number) if number.is_integer() and abs(number) < 1e15 else number
 
 
 def slider_alphas(critical: Sequence[float], interval: tuple[float, float]) -> list[float]:
@@ -264,7 +244,7 @@ def _arc(arc: Arc, graph: BranchGraph, curve: Curve | None) -> dict[str, Any]:
         "tail": arc.tail,
         "head": arc.head,
         "index": arc.index,
-        "statuses": status_codes(arc.statuses),
+        "statuses": parts.status_codes(arc.statuses),
         "dimension": arc.dimension,
         "grazing": arc.grazing,
         "lo": arc.lo,
@@ -273,7 +253,11 @@ def _arc(arc: Arc, graph: BranchGraph, curve: Curve | None) -> dict[str, Any]:
     if graph.verdicts is not None:
         record["spans"] = [[span.low, span.high, span.verdict] for span in graph.verdicts[arc.number]]
     if curve is not None:
-        record |= {"a": curve.alphas.tolist(), "f": rounded_list(curve.forces), "w": rounded_list(curve.moves)}
+        record |= {
+            "a": curve.alphas.tolist(),
+            "f": parts.short_list(curve.forces, 9),
+            "w": parts.short_list(curve.moves, 9),
+        }
     return record
 
 
@@ -283,15 +267,19 @@ def _vertex(v: Vertex, graph: BranchGraph) -> dict[str, Any]:
         "alpha": v.alpha,
         "kind": v.kind.value,
         "border": v.border,
-        "statuses": status_codes(v.statuses),
+        "statuses": parts.status_codes(v.statuses),
         "several": [k for k, holds in enumerate(v.active) if len(holds) > 1],
-        "f": rounded_list(np.concatenate([v.lambda_n, v.lambda_t.ravel(order="F")])),
-        "w": rounded_list(np.concatenate([v.u_n, v.u_t.ravel(order="F")])),
+        "f": parts.short_list(np.concatenate([v.lambda_n, v.lambda_t.ravel(order="F")]), 9),
+        "w": parts.short_list(np.concatenate([v.u_n, v.u_t.ravel(order="F")]), 9),
         "family": None,
     }
     if v.family is not None:
         forces, moves = family_states(graph.problem, v.alpha, v.family)
-        record["family"] = {"f": rounded_list(forces), "w": rounded_list(moves), "dimension": v.family.dimension}
+        record["family"] = {
+            "f": parts.short_list(forces, 9),
+            "w": parts.short_list(moves, 9),
+            "dimension": v.family.dimension,
+        }
     return record
 
 

@@ -16,7 +16,7 @@ import scipy.sparse as sp
 
 from enumsol._version import find_version
 from enumsol.errors import MissingDependencyError
-from enumsol.model.cells import boundary, boundary_facets, facet_outlines, outline_edges
+from enumsol.model.cells import boundary, boundary_facets, edges_of, facet_outlines, outline_edges
 from enumsol.model.shapes import SIGNS, BodyShape, acting_nodes, body_shape, first_view, row_frames, row_tangents, signs
 from enumsol.model.statuses import ContactStatus
 
@@ -128,7 +128,7 @@ def drawn_body(
     new[nodes] = np.arange(len(nodes))
     body = {"points": short_list(shape.points[nodes]), "rows": _rows(shape, nodes), "size": shape.size}
     if d == 3:
-        more = surroundings(problem, shape, new, _edges(faces), scene) | {
+        more = surroundings(problem, shape, new, edges_of(faces), scene) | {
             "tangents": short_list(row_tangents(problem)),
             "view": short_list(first_view(row_frames(problem)[:, 0])),
         }
@@ -153,15 +153,9 @@ def _surface(shape: BodyShape, faces: Integers, new: Integers) -> dict[str, Any]
     return {
         "triangles": new[fan].T.tolist(),
         # of many facets only the edges at which the surface bends
-        "edges": new[_edges(faces) if len(faces) <= 2_000 else outline].tolist(),
+        "edges": new[edges_of(faces) if len(faces) <= 2_000 else outline].tolist(),
         "outline": new[outline].tolist(),
     }
-
-
-def _edges(faces: Integers) -> Integers:
-    """Edges of the outlines of facets, (k, 2)."""
-    edges = np.sort(np.stack([faces, np.roll(faces, -1, axis=1)], axis=2).reshape(-1, 2), axis=1)
-    return np.unique(edges[edges[:, 0] != edges[:, 1]], axis=0)
 
 
 def bare_nodes(problem: AnyProblem) -> tuple[dict[str, Any] | None, str]:
@@ -270,12 +264,13 @@ def boundary_edges(outlines: Integers) -> Integers:
     return np.asarray(edges[first[count == 1]])
 
 
-def short_list(values: ArrayLike) -> Any:
-    """Numbers to seven digits, as lists; zeros lose their sign and integers their point."""
-    array = np.asarray(values)
+def short_list(values: ArrayLike, digits: int = 7) -> Any:
+    """Numbers to so many digits, as lists; zeros lose their sign and integers their point."""
+    array = np.asarray(values, dtype=np.float64)
     if array.ndim > 1:
-        return [short_list(row) for row in array]
-    return [int(x) if x == int(x) and abs(x) < 1e15 else float(f"{x:.7g}") for x in array.tolist()]
+        return [short_list(row, digits) for row in array]
+    numbers = [float(f"{x:.{digits}g}") for x in array.tolist()]
+    return [int(x) if x.is_integer() and abs(x) < 1e15 else x for x in numbers]
 
 
 #: Scripts of pages with bodies, before those of one kind.

@@ -1,42 +1,30 @@
-"""The page of a RootSet: words and tables in HTML around the bodies that the script draws."""
+"""The pages of a RootSet and of a history: words and tables in HTML around bodies and figures."""
 
 from __future__ import annotations
 
+import base64
 from collections import Counter
 from html import escape
+from io import BytesIO
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from enumsol.errors import InvalidArgumentError
+from enumsol.loading.history_data import steps_table, tree_lines
 from enumsol.model.shapes import body_shape
-from enumsol.report.parts import (
-    CERTIFIED_DATA,
-    DRAWING,
-    STATUS_NAMES,
-    Heading,
-    Statement,
-    bare_nodes,
-    drawn_body,
-    filled_page,
-    most_fields,
-    packed_plotly,
-    proof_commands,
-    short_list,
-    span_words,
-    status_codes,
-    surface_stresses,
-    table_text,
-    vectors,
-    with_unit,
-)
+from enumsol.report import parts
 from enumsol.roots.root import summary
 from enumsol.roots.root_set import ABOUT_STABILITY
-from enumsol.support.messages import counted, found_of
+from enumsol.support.messages import counted, found_of, html_table
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
 
+    from matplotlib.figure import Figure
+
     from enumsol.fem import Scene
+    from enumsol.loading.history import History
     from enumsol.roots.root import Root
     from enumsol.roots.root_set import RootSet
     from enumsol.support.array_types import Floats
@@ -50,29 +38,29 @@ _MOST_ROWS = 500
 _MOST_VALUES = 150_000
 
 
-def roots_page(found: RootSet, heading: Heading) -> str:
+def roots_page(found: RootSet, heading: parts.Heading) -> str:
     """The text of the page."""
     content = roots_content(found, heading.scene) | {"units": heading.units, "alpha": float(found.alpha)}
     turned = content["body"] is not None and "triangles" in content["body"]
     more = "; the proof's first record holds the same fingerprint."
     incomplete = "This result is not complete. Every root shown is a solution, but there may be more. Why:"
-    said = Statement(
+    said = parts.Statement(
         "" if found.whole else incomplete,
         _reasons(found),
         _root_facts(found, heading.units),
         _answers(found),
         _what_is_certified(found),
         found[0].problem.fingerprint if len(found) else None,
-        "" if found.arithmetic == "fast" else proof_commands("roots", "--alpha A", more),
+        "" if found.arithmetic == "fast" else parts.proof_commands("roots", "--alpha A", more),
     )
     words = {
-        "plotly": packed_plotly() if turned else "",
+        "plotly": parts.packed_plotly() if turned else "",
         "alpha": escape(f"{float(found.alpha):.10g}"),
         "roots": _root_table(found),
         "families": _family_table(found),
         "undecided": _undecided_table(found),
     }
-    return filled_page("roots", found, heading, said, (*DRAWING, "page.roots.js"), content, words)
+    return parts.filled_page("roots", found, heading, said, (*parts.DRAWING, "page.roots.js"), content, words)
 
 
 def _reasons(found: RootSet) -> list[str]:
@@ -108,12 +96,16 @@ def _root_facts(found: RootSet, units: tuple[str, str] | None) -> list[tuple[str
     if len(found):
         problem = found[0].problem
         F = problem.friction_at(found.alpha)
-        friction = span_words(F) if F.ndim == 1 else f"{span_words(F[:, 0])} along t1, {span_words(F[:, 1])} along t2"
+        friction = (
+            parts.span_words(F)
+            if F.ndim == 1
+            else f"{parts.span_words(F[:, 0])} along t1, {parts.span_words(F[:, 1])} along t2"
+        )
         facts += [
             ("degrees of freedom", f"{problem.n:,}"),
             ("friction", friction),
-            ("load", with_unit(f"max |f| = {np.max(np.abs(problem.load_at(found.alpha))):.4g}", units, 1, 0)),
-            ("gap", with_unit(span_words(problem.gap), units, 0, 1)),
+            ("load", parts.with_unit(f"max |f| = {np.max(np.abs(problem.load_at(found.alpha))):.4g}", units, 1, 0)),
+            ("gap", parts.with_unit(parts.span_words(problem.gap), units, 0, 1)),
         ]
     return [*facts, ("arithmetic", found.arithmetic), ("searched", counted(found.stats.nodes, "node") + " of the tree")]
 
@@ -174,7 +166,7 @@ def _table(caption: str, what: str, items: Sequence[Any], columns: _Columns, kep
     """A table of items, of many the first, with the attributes ``kept`` of their rows."""
     rows = [(kept.format(k), [of(k, item) for of in columns.values()]) for k, item in enumerate(items[:_MOST_ROWS])]
     more = f"<p>and {len(items) - _MOST_ROWS} more {what}</p>" if len(items) > _MOST_ROWS else ""
-    return table_text(caption, columns, rows) + more
+    return parts.table_text(caption, columns, rows) + more
 
 
 def _span(values: Floats, digits: int) -> str:
@@ -189,7 +181,7 @@ def _what_is_certified(found: RootSet) -> list[str]:
     if found.complete:
         known = (
             "It is proven that the problem has the listed solutions at this alpha, and no others. This is about "
-            f"{CERTIFIED_DATA[found.certified_data]}."
+            f"{parts.CERTIFIED_DATA[found.certified_data]}."
         )
     elif found.arithmetic == "fast":
         known = "Nothing is proven: the result rests on floating-point arithmetic."
@@ -216,7 +208,7 @@ def roots_content(found: RootSet, scene: Scene | None = None) -> dict[str, Any]:
     verdicts = [{"stability": one.verdict} for one in found.verdicts or ()] or [{}] * len(listed)
     return {
         "nodes": [str(label) for label in found.node_ids],
-        "statuses": STATUS_NAMES,
+        "statuses": parts.STATUS_NAMES,
         "tangents": listed[0].lambda_t[:1].size if listed else 1,
         "all": len(found),
         "roots": [_record(root) | verdicts[k] | bodies[k] for k, root in enumerate(listed)],
@@ -229,13 +221,13 @@ def _record(root: Root) -> dict[str, Any]:
         "index": root.index,
         "regular": root.regular,
         "margin": float(f"{root.margin:.3g}"),
-        "statuses": status_codes(root.statuses),
+        "statuses": parts.status_codes(root.statuses),
         "several": [i for i, holds in enumerate(root.active) if len(holds) > 1],
-        "f": short_list(np.concatenate([root.lambda_n, root.lambda_t.ravel(order="F")])),
-        "w": short_list(np.concatenate([root.u_n, root.u_t.ravel(order="F")])),
+        "f": parts.short_list(np.concatenate([root.lambda_n, root.lambda_t.ravel(order="F")])),
+        "w": parts.short_list(np.concatenate([root.u_n, root.u_t.ravel(order="F")])),
         "angles": None
         if root.slip_angle is None
-        else [None if np.isnan(pair[0]) else short_list(pair) for pair in root.slip_angle],
+        else [None if np.isnan(pair[0]) else parts.short_list(pair) for pair in root.slip_angle],
     }
 
 
@@ -243,20 +235,20 @@ def _pictures(roots: Sequence[Root], scene: Scene | None) -> tuple[dict[str, Any
     """The body, or why there is none, and what moves it and acts on it by root; of many roots the first."""
     problem = roots[0].problem
     if problem.mesh is None:
-        body, why = bare_nodes(problem)
+        body, why = parts.bare_nodes(problem)
         still = [] if body is None else [{"u": [0] * (3 * problem.p), "forces": []}] * len(roots)
         return _picture(body, why), still
     shape = body_shape(problem)
-    body, nodes = drawn_body(problem, shape, len(roots) + 1, scene)
-    count = most_fields(*shape.points[nodes].shape) - 1
+    body, nodes = parts.drawn_body(problem, shape, len(roots) + 1, scene)
+    count = parts.most_fields(*shape.points[nodes].shape) - 1
     if count < 1:
         return _picture(None, f"The mesh is too large to draw: its boundary alone has {len(nodes):,} nodes"), []
-    stresses = surface_stresses(problem, shape, min(count, len(roots)))
+    stresses = parts.surface_stresses(problem, shape, min(count, len(roots)))
     bodies = [
         {
-            "u": short_list(shape.moves(root.problem, root.u, root.alpha)[nodes].ravel()),
-            "forces": vectors(shape.contact_forces(problem, root.lambda_n, root.lambda_t), nodes),
-            **({} if stresses is None else {"s": short_list(stresses(root.u))}),
+            "u": parts.short_list(shape.moves(root.problem, root.u, root.alpha)[nodes].ravel()),
+            "forces": parts.vectors(shape.contact_forces(problem, root.lambda_n, root.lambda_t), nodes),
+            **({} if stresses is None else {"s": parts.short_list(stresses(root.u))}),
         }
         for root in roots[:count]
     ]
@@ -266,3 +258,107 @@ def _pictures(roots: Sequence[Root], scene: Scene | None) -> tuple[dict[str, Any
 
 def _picture(body: dict[str, Any] | None, why: str) -> dict[str, Any]:
     return {"body": body, "no_body": why}
+
+
+# -- history page ------------------------------------------------------------------------------------------------------
+# The page about a history: its steps, tree, figures, the bodies of every step, and what is certified.
+
+
+def history_page(history: History, heading: parts.Heading) -> str:
+    """The text of the page."""
+    units = heading.units
+    incomplete = (
+        "This history is not complete. Every root shown is a solution of its step, but roots and histories may be "
+        "missing. Why:"
+    )
+    said = parts.Statement(
+        incomplete if history.reasons else "",
+        history.reasons,
+        _facts(history),
+        (),
+        _certified(history),
+        history.problem.fingerprint,
+        parts.proof_commands("history", "--steps STEPS", "."),
+    )
+    words = {
+        "steps": parts.scrolling("Steps", html_table(*steps_table(history, units))),
+        "tree": escape("\n".join(tree_lines(history, 1000))),
+        "figures": _figures(history, units),
+        "bodies": _bodies(history, units),
+    }
+    return parts.filled_page("history", history, heading, said, ("page.theme.js", "page.history.js"), {}, words)
+
+
+def _facts(history: History) -> list[tuple[str, str]]:
+    problem, total = history.problem, history.counts[-1]
+    return [
+        ("contact nodes", str(problem.p)),
+        ("degrees of freedom", f"{problem.n:,}"),
+        ("steps", str(len(history.steps))),
+        ("histories", f"{total:,}{'' if history.complete else ' found'}" if total else "none reaches the last step"),
+        ("branchings", str(len(history.branchings))),
+        ("arithmetic", history.arithmetic),
+        ("increments", "not halved" if history.refinement is None else str(history.refinement)),
+    ]
+
+
+def _figures(history: History, units: tuple[str, str] | None) -> str:
+    pairs = (("displacement", "alpha"), ("step", "dissipated"), ("step", "lambda_n"), ("displacement", "lambda_t"))
+    moves = any(step.alpha is not None for step in history.steps)
+    return "".join(
+        _image(history.plot(x, y, units=units), f"{y} against {x}") for x, y in pairs if moves or y != "alpha"
+    )
+
+
+def _bodies(history: History, units: tuple[str, str] | None) -> str:
+    from enumsol.roots.body_plots import draw_bodies  # matplotlib comes with the first picture
+
+    # of many steps the last ones: a picture takes some ten thousand bytes
+    shown = [number for number in range(1, len(history.steps) + 1) if history.nodes_of(number)][-24:]
+    pictures = {}
+    for number in shown:
+        try:
+            drawn = draw_bodies(history.roots(number), units=units)
+            pictures[number] = _image(drawn, f"deformed bodies of step {number}")
+        except InvalidArgumentError as error:
+            return f"<p>They are not drawn: {escape(str(error))}.</p>"
+    if not pictures:
+        return "<p>There are none.</p>"
+    choices = "".join(f'<option value="{number}"{_last(number, shown)}>{number}</option>' for number in shown)
+    parts = "".join(f'<div data-step="{number}">{picture}</div>' for number, picture in pictures.items())
+    return (
+        f'<div class="controls"><label>step <select id="step">{choices}</select></label></div>'
+        f'<p class="hint">All roots of the step; displacements are counted from the unloaded body and '
+        f"enlarged as every picture says.</p>{parts}"
+    )
+
+
+def _last(number: int, shown: list[int]) -> str:
+    return " selected" if number == shown[-1] else ""
+
+
+def _image(figure: Figure, words: str) -> str:
+    drawn = BytesIO()
+    figure.savefig(drawn, format="png", dpi=96)
+    text = base64.b64encode(drawn.getvalue()).decode()
+    return f'<figure><img src="data:image/png;base64,{text}" alt="{escape(words)}"></figure>'
+
+
+def _certified(history: History) -> list[str]:
+    if history.complete:
+        known = (
+            "It is proven that these are all histories of the steps as they are given: every step has no other roots, "
+            "from wherever it starts. What happens between the ends of the steps is not part of it."
+        )
+    elif history.arithmetic == "fast":
+        known = "Nothing is proven: the result rests on floating-point arithmetic."
+    else:
+        known = f"The history is proven to be unique until step {history.unique_until}."
+    stages = history.all_stages
+    widest = max((stage.largest_radius for stage in stages), default=0.0)
+    size = max((float(np.max(np.abs(stage.start.offset), initial=0.0)) for stage in stages), default=0.0)
+    searches = counted(len(stages), "search", "searches")
+    return [
+        known,
+        f"{searches}; where slip is counted from is known within {widest:.1e}, for offsets up to {size:.3g}.",
+    ]

@@ -1,40 +1,159 @@
-"""enumerate_roots: every solution at one alpha (theory, sections 2-5); is_unique: whether there is only one."""
+"""enumerate_roots: every solution at one alpha (theory, sections 2-5); is_unique: whether there is only one.
+
+The oracle for small p solves all 4^p selections, block by block.
+"""
 
 from __future__ import annotations
 
 import math
 import time
+from itertools import product
+from math import prod
 from typing import TYPE_CHECKING, Any, Literal
 
-from enumsol.errors import InvalidArgumentError
+import numpy as np
+
+from enumsol.errors import InvalidArgumentError, TooLargeError
 from enumsol.model.contact_body import ContactBody
 from enumsol.model.problem import ContactProblem
-from enumsol.roots.builder import RootBuilder, in_order, named, root_family
-from enumsol.roots.components import RootComponent, apart, closed_component, connected_components
+from enumsol.model.statuses import FINAL, INEQUALITIES, OPEN, SLIP_MINUS, SLIP_PLUS, STICK
+from enumsol.roots.components import (
+    RootBuilder,
+    RootComponent,
+    apart,
+    closed_component,
+    connected_components,
+    in_order,
+    named,
+    root_family,
+)
 from enumsol.roots.enumeration import Enumeration, not_begun
 from enumsol.roots.root_set import RootSet
 from enumsol.search.certifiers.protocol import UndecidedPart
-from enumsol.search.exhaustive import BLOCK, exhaustive_exact, exhaustive_float
 from enumsol.search.outcome import SearchLimits, SearchProgress, Stop, StopReason
 from enumsol.search.solvers import Arithmetic, Solvers
 from enumsol.selections.float_selections import SIGN_TOLERANCE
 from enumsol.selections.solution import SelectionSolution, SelectionSolver
 from enumsol.support import arguments
-from enumsol.support.deadlines import Deadline, TimeOverError, keeping, within
+from enumsol.support.deadlines import Deadline, TimeOverError, keeping, look, within
 from enumsol.support.messages import counted
 from enumsol.support.workers import workers_of
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Sequence
+    from collections.abc import Callable, Iterator, Sequence
     from concurrent.futures import Executor
     from pathlib import Path
 
     from typing_extensions import TypeIs
 
+    from enumsol.condensation.condensed import ScaledSystem
     from enumsol.model.problem3d import AnyProblem, ContactProblem3D
     from enumsol.roots.root import Root, RootFamily
-    from enumsol.support.array_types import Alpha, AlphaLike, Codes
+    from enumsol.support.array_types import Alpha, AlphaLike, Codes, Floats, Mask, NDArray
     from enumsol.support.deadlines import Ending
+
+
+#: Selections solved together in floats, and between two reports of progress.
+BLOCK = 2048
+#: Selections whose float solution breaks a condition by more than this are dropped without a second look.
+_SCREEN = 1e-6
+
+
+def all_codes(F_positive: tuple[bool, ...]) -> Iterator[Codes]:
+    """Every selection: four statuses per node, two (open, in contact) where F = 0."""
+    return product(*(FINAL[positive] for positive in F_positive))
+
+
+def refuse_if_too_large(F_positive: tuple[bool, ...], limit: int, per_second: float) -> int:
+    """Number of selections.
+
+    Raises
+    ------
+    TooLargeError
+        There are more than ``limit``; the message estimates the cost.
+    """
+    count = prod(len(FINAL[positive]) for positive in F_positive)
+    if count > limit:
+        hours = count / per_second / 3600
+        raise TooLargeError(
+            f'method="exhaustive" would solve {count:.3g} selections (about {hours:.3g} hours); the limit is {limit} '
+            'selections: use method="tree"'
+        )
+    return count
+
+
+def exhaustive_float(system: ScaledSystem, solver: SelectionSolver) -> Iterator[tuple[int, SelectionSolution | None]]:
+    """Selections examined so far with a solution found, or with None after every block; in floats.
+
+    A vectorised solve screens every block; what it cannot refuse clearly (all conditions nearly hold, or the matrix is
+    nearly singular) is decided by ``solver``.
+    """
+    total = refuse_if_too_large(solver.F_positive, 4**11, 20_000.0)
+    codes = all_codes(solver.F_positive)
+    done = 0
+    while done < total:
+        block = np.array([next(codes) for _ in range(min(BLOCK, total - done))], dtype=np.int8)
+        for row in block[_candidates(system, block)]:
+            look()
+            solution = solver.solve(tuple(int(c) for c in row))
+            if solution is not None:
+                yield done, solution
+        done += len(block)
+        yield done, None
+
+
+def _candidates(system: ScaledSystem, block: NDArray[np.int8]) -> Mask:
+    """Mask of the selections of a block that may hold a root."""
+    p, F, S, g = system.p, system.F, system.S, system.g
+    M, b = selection_systems(S, g, F, block)
+    # rows and columns of comparable size, so that the reciprocal condition means something
+    scale = np.max(np.abs(M), axis=2)
+    M /= scale[:, :, None]
+    singular = np.linalg.svd(M, compute_uv=False)
+    # with a smaller reciprocal condition the screen does not trust a float solution
+    doubtful = singular[:, -1] <= 1e-9 * singular[:, 0]
+    M[doubtful] = np.eye(2 * p)
+    force = np.linalg.solve(M, (b / scale)[:, :, None])[:, :, 0]
+    w = g - force @ S
+    size = _SCREEN * (1.0 + np.max(np.abs(force), axis=1, keepdims=True))
+    n, t, wn, wt = force[:, :p], force[:, p:], w[:, :p], w[:, p:]
+    reach = F * n * (1 + _SCREEN) + size
+    rows = [n + size, t, reach - t, reach + t, size - wn, wt + size, size - wt]  # in the order of RowKind
+    broken = INEQUALITIES[block] & (np.stack(rows, axis=-1) < 0)
+    return np.asarray(doubtful | ~np.any(broken, axis=(1, 2)))
+
+
+def exhaustive_exact(solver: SelectionSolver) -> Iterator[tuple[int, SelectionSolution | None]]:
+    """Selections examined so far with the last one's solution, or None; in rationals, one linear solve each."""
+    refuse_if_too_large(solver.F_positive, 4**7, 1_000.0)
+    for done, codes in enumerate(all_codes(solver.F_positive), start=1):
+        yield done, solver.solve(codes)
+
+
+def selection_systems(S: Floats, g: Floats, F: Floats, codes: NDArray[np.int8]) -> tuple[Floats, Floats]:
+    """Linear systems M lambda = b of condensed selections (theory, section 2.3).
+
+    Parameters
+    ----------
+    S, g, F : condensed compliance (2p, 2p), displacements (2p,) and friction (p,)
+    codes : (k, p) integer array of status codes
+
+    Returns
+    -------
+    M : (k, 2p, 2p) array
+    b : (k, 2p) array
+        Rows: lambda_n = 0 and lambda_t = 0 (open); w_n = 0 and w_t = 0 (stick); w_n = 0 and lambda_t = +-F lambda_n.
+    """
+    k, p = codes.shape
+    node = np.arange(p)
+    closed, stick = codes != OPEN, codes == STICK
+    slip = np.where(codes == SLIP_PLUS, 1.0, 0.0) - np.where(codes == SLIP_MINUS, 1.0, 0.0)
+    M = np.zeros((k, 2 * p, 2 * p))
+    held = np.concatenate([closed, stick], axis=1)
+    M += held[:, :, None] * S
+    M[:, np.arange(2 * p), np.arange(2 * p)] += ~held
+    M[:, p + node, node] -= slip * F
+    return M, held * g
 
 
 Method = Literal["tree", "exhaustive"]
@@ -140,7 +259,7 @@ def enumerate_roots(
     if _is_in_space(problem):
         # not for problems in 2D
         from enumsol.roots.space_roots import SpaceEnumeration, check_supported
-        from enumsol.search.space.space_setup import SpaceSolvers
+        from enumsol.search.space.space_search import SpaceSolvers
 
         check_supported(arithmetic, method, engine)
     _check_proof(arithmetic, method, proof_path, resume)
@@ -353,29 +472,18 @@ def roots_of_selections(problem: ContactProblem, alpha: Alpha, selections: Seque
     whole : no others hold
     """
     solvers = Solvers(problem, alpha, "verified", SIGN_TOLERANCE)
-    return _Selected(solvers, None, None, method="graph").select(selections, whole=whole)
-
-
-class _Selected(_Enumeration):
-    """The roots of given selections."""
-
-    def select(self, selections: Sequence[Codes], *, whole: bool) -> RootSet:
-        """Examine them one by one."""
-        outcome = self.outcome
-        self.unloaded = self.solvers.unloaded()
-        for codes in () if self.unloaded else selections:
-            outcome.selections += 1
-            found = self.certifier.selection(codes)
-            if isinstance(found, UndecidedPart):
-                outcome.undecided.append(found)
-            elif found is not None:
-                outcome.solutions.append(found)
-        if not whole:
-            outcome.stopped = Stop(StopReason.GRAPH_INCOMPLETE)
-        return self._result()
-
-    def _proof(self, **counts: int) -> None:
-        del counts
+    search = _Enumeration(solvers, None, None, method="graph")
+    search.writer, search.unloaded, outcome = None, solvers.unloaded(), search.outcome
+    for codes in () if search.unloaded else selections:
+        outcome.selections += 1
+        found = search.certifier.selection(codes)
+        if isinstance(found, UndecidedPart):
+            outcome.undecided.append(found)
+        elif found is not None:
+            outcome.solutions.append(found)
+    if not whole:
+        outcome.stopped = Stop(StopReason.GRAPH_INCOMPLETE)
+    return search._result()
 
 
 def _check_proof(arithmetic: str, method: str, proof_path: str | Path | None, resume: bool) -> None:

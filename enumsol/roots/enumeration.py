@@ -14,15 +14,12 @@ import numpy as np
 from enumsol.condensation.condensed import condensation_of
 from enumsol.errors import OutputError
 from enumsol.model.statuses import STATUSES, ContactStatus
-from enumsol.proof.begun import BegunProof, begun_proof
-from enumsol.proof.writer import ProofWriter
+from enumsol.proof.writer import BegunProof, ProofWriter, begun_proof
 from enumsol.roots.root import Enclosure, Root
 from enumsol.roots.root_set import RigidBound, RootSet, SearchStats, Undecided
 from enumsol.search.certifiers.protocol import UndecidedPart
 from enumsol.search.outcome import AWAY, HOLD, SearchLimits, SearchOutcome, SearchProgress, Stop, StopReason
-from enumsol.search.parallel import SpreadSearch
-from enumsol.search.resume import resume
-from enumsol.search.setup import SearchSetup
+from enumsol.search.setup import Replay, SearchSetup, SpreadSearch
 from enumsol.support.deadlines import Deadline, within
 
 if TYPE_CHECKING:
@@ -91,13 +88,16 @@ class Enumeration(ABC, Generic[_Solvers]):
         self, executor: Executor | None, stop_after: int | None, max_nodes: int | None, time_limit: float | None
     ) -> RootSet:
         """Search, then build the result."""
-        until = Deadline.after(self.started, time_limit)
-        limits = SearchLimits(None if stop_after is None else self._enough(stop_after), max_nodes, until.deadline)
+        enough, until = (
+            None if stop_after is None else self._enough(stop_after),
+            Deadline.after(self.started, time_limit),
+        )
+        limits = SearchLimits(until.deadline, enough, max_nodes)
         self._search(limits, executor)
         if self.writer is not None:
             self.writer.replace()
         # a search that goes on with an earlier one has moved its deadline
-        with within(Deadline(limits.deadline).extended(self.started)):
+        with within(limits.extended(self.started)):
             result = self._result()
         if self.writer is not None and self.writer.failure is not None:
             raise OutputError(self.writer.failure, result)
@@ -120,8 +120,9 @@ class Enumeration(ABC, Generic[_Solvers]):
         self.tree = search = solvers.search(self.certifier, limits, self.progress)
         earlier = () if self._begun is None or self.writer is None else (self._begun, self.writer.replace)
         self.outcome = search.outcome
-        search.at_limit = solvers.at_limit
-        search.rest.otherwise = AWAY if search.at_limit is not None else "" if self.problem.held else HOLD
+        limit = solvers.at_limit
+        search.at_limit = None if limit is None else limit.nodes
+        search.rest.otherwise = AWAY if limit is not None else "" if self.problem.held else HOLD
         search.rest.continua = self._continua
         if solvers.unloaded():
             self.certifier.unloaded()
@@ -137,7 +138,7 @@ class Enumeration(ABC, Generic[_Solvers]):
                 search.loop = spread.run
             try:
                 if earlier:
-                    resume(search, solvers.reader(), *earlier)
+                    Replay(search, solvers.limits, solvers.enclosed).run(*earlier)
                 else:
                     search.run()
             finally:

@@ -168,7 +168,7 @@ def branch_test(condensed: CondensedProblem, friction: tuple[Floats, Floats], ro
     active = []
     for without, holds in zip(frictionless, root.active, strict=True):
         codes = {_CODES[status] for status in holds}
-        active.append(frozenset(OPEN if code == OPEN else FRICTIONLESS for code in codes) if without else codes)
+        active.append(_without_friction(codes) if without else codes)
     F, slips = F0 + alpha * F1, None
     if F.ndim == 2:
         scale = condensed.node_scale[: len(F), None]

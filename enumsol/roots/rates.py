@@ -10,10 +10,10 @@ import numpy as np
 
 from enumsol.errors import InvalidArgumentError, TooLargeError
 from enumsol.model.statuses import ContactStatus
-from enumsol.roots.stability import Equilibria, displacement
+from enumsol.roots.stability import Stabilities, displacement
 from enumsol.support.array_arguments import real_array, vector_of
 from enumsol.support.immutable import Sealed
-from enumsol.trusted.motions_of_body import BodyMotions, friction_changes, friction_over
+from enumsol.trusted.motions_of_body import friction_changes, friction_over
 from enumsol.trusted.running_away import Behaviour, positive, rates_in
 from enumsol.trusted.status_rows import OPEN, SLIP_MINUS, SLIP_PLUS, STICK
 
@@ -130,7 +130,7 @@ def rates(problem: AnyProblem, root: Root, load_rate: ArrayLike, friction_rate: 
     (True, False)
     """
     load, change = vector_of(load_rate, "load_rate", problem.n), _friction_rate(problem, friction_rate)
-    asked = Equilibria(problem, BodyMotions(problem, at_rest=True))
+    asked = Stabilities(problem, at_rest=True)
     asked.check(root)
     F = friction_over(problem, root.alpha, root.alpha)
     loaded = np.array([ContactStatus.OPEN not in active for active in root.active])

@@ -36,8 +36,6 @@ _EXPLAINED = (
     "index: the sign of a determinant; regular: no node is between two statuses",
     "margin: distance to the next change of status, relative to the largest values",
 )
-#: Explains the column.
-_NO_FAMILIES = "families of solutions are not examined for stability"
 ABOUT_STABILITY = "stability: whether the body can leave it along a straight line, growing (proven where it is decided)"
 
 #: Rotations above this are not small [degrees]: their cosine differs from one by 1.5 percent.
@@ -318,7 +316,7 @@ class RootSet(Sequence[Root], Immutable):
         >>> enumsol.verify(problem, proof).verdicts
         ('does not run away', 'runs away', 'does not run away')
         """
-        from enumsol.roots.stability_proof import write_proof  # as above
+        from enumsol.roots.stability import write_proof  # as above
 
         if not len(self):
             raise InvalidArgumentError("there is no isolated root; expected one whose stability can be proven")
@@ -551,7 +549,7 @@ class RootSet(Sequence[Root], Immutable):
 
     def _explained(self) -> tuple[str, ...]:
         asked = self.verdicts is not None
-        left_out = (_NO_FAMILIES,) if asked and self.families else ()
+        left_out = ("families of solutions are not examined for stability",) if asked and self.families else ()
         return (*_EXPLAINED, *((ABOUT_STABILITY,) if asked else ()), *left_out) if len(self) else left_out
 
     def _repr_html_(self) -> str:

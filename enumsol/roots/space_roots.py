@@ -31,12 +31,12 @@ from enumsol.roots.local_branch import SelectionTangent
 from enumsol.roots.root import Enclosure, Root
 from enumsol.roots.root_set import RootSet, Undecided
 from enumsol.search.space.open_leaves import Cause
-from enumsol.search.space.space_setup import SpaceSolvers
+from enumsol.search.space.space_search import SpaceSolvers
 from enumsol.support.deadlines import over, tell
 from enumsol.support.immutable import sealed
 from enumsol.trusted.space.boxed_solution import BoxedSolution, apart_in_boxes
 from enumsol.trusted.space.leaves import Open, SpaceRoot, distinct_roots, settle, unsettled
-from enumsol.trusted.space.space_uniqueness import LooseSolution, OnlySolution
+from enumsol.trusted.space.space_uniqueness import LooseSolution
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
@@ -55,10 +55,10 @@ class SpaceEnumeration(Enumeration[SpaceSolvers]):
 
     def _distinct(self) -> tuple[list[tuple[Codes, Any]], list[Codes]]:
         verified = self.certifier.certified.verified
-        only = [(codes, root) for codes, root in verified.items() if isinstance(root, OnlySolution)]
+        boxed = [leaf for leaf in verified.items() if isinstance(leaf[1], BoxedSolution)]
+        only = [leaf for leaf in verified.items() if type(leaf[1]) is LooseSolution]
         if only:
             return only, []
-        boxed = [(codes, root) for codes, root in verified.items() if isinstance(root, BoxedSolution)]
         regular = distinct_roots(leaf for leaf in verified.items() if not isinstance(leaf[1], BoxedSolution))
         others = apart_in_boxes(regular.kept, boxed)
         return [*regular.kept, *others.kept], [codes for codes, _ in (*regular.doubtful, *others.doubtful)]
@@ -103,7 +103,7 @@ class SpaceEnumeration(Enumeration[SpaceSolvers]):
 
     def _loose(self, found: LooseSolution) -> Root:
         """A solution whose statuses need not be known."""
-        tau, bounds, forces = self.solvers.system.tau, self._loose_bounds(found), self._forces(found.y.mid)
+        tau, bounds, forces = self.solvers.system.tau, self._enclosure(found.y, found.w), self._forces(found.y.mid)
         u_n, u_t = self._displacements(*forces)
         u_n, u_t = (np.clip(u, b[..., 0], b[..., 1]) for u, b in ((u_n, bounds.u_n), (u_t, bounds.u_t)))
         active = [frozenset(_possible(found, i, u_t[i], rubs=bool(np.any(tau[i] >= 0)))) for i in range(len(tau))]
@@ -143,9 +143,6 @@ class SpaceEnumeration(Enumeration[SpaceSolvers]):
         unit = system.force
         return scaled[: system.p] * unit, system.tangential(scaled) * system.F * unit[:, None]
 
-    def _loose_bounds(self, found: LooseSolution) -> Enclosure:
-        return self._enclosure(found.y, found.w)
-
     def _loose_angles(self, found: LooseSolution) -> Floats:
         return np.array([_around(*pair) for pair in zip(*loose_angles(self.solvers.enclosed, found), strict=True)])
 
@@ -156,12 +153,8 @@ class SpaceEnumeration(Enumeration[SpaceSolvers]):
 
     def _in_units(self, rigid: Ball) -> Ball:
         """Coordinates of a rigid displacement, without the units of their rows, which are powers of two."""
-        unit = self._rigid_unit
+        unit = self.solvers.enclosed.rigid_unit
         return Ball(rigid.mid * unit, rigid.rad * unit)
-
-    @property
-    def _rigid_unit(self) -> Floats:
-        return self.solvers.enclosed.rows.unit if not self.solvers.enclosed.held else np.ones(0)
 
     @cached_property
     def _moved(self) -> Ball:
@@ -198,18 +191,7 @@ class SpaceEnumeration(Enumeration[SpaceSolvers]):
         """
         system, exact, p = self.solvers.system, self.solvers.enclosed, self.problem.p
         S, g = self._in_balls
-        forces, known = (Ball(np.zeros(3 * p), np.full(3 * p, radius)) for radius in (0.0, np.inf))
-        for k in range(3):
-            occurs = np.arange(p) if k == 0 else np.flatnonzero(system.tau[:, k - 1] >= 0)
-            part = occurs if k == 0 else system.tau[occurs, k - 1]
-            F = inverse = Ball.exact(np.ones(p))
-            if k:
-                F, inverse = Ball(exact.F, exact.F_rad)[occurs, k - 1], exact.inverse_friction[occurs, k - 1]
-            for ball, scaled, factor, unit in ((forces, y, F, system.force), (known, w, inverse, system.length)):
-                product = scaled[part] * factor
-                zero = (scaled.mid[part] == 0) & (scaled.rad[part] == 0)
-                ball.mid[k * p + occurs] = product.mid * unit[occurs]
-                ball.rad[k * p + occurs] = np.where(zero, 0.0, product.rad * unit[occurs])
+        forces, known = exact.forces_of(y, system.force), exact.displacements_of(w, system.length)
         computed, moves = g - (S @ forces[:, None])[:, 0], None
         if not exact.held:
             rigid = self._in_units(Ball(0.0 * exact.reach, exact.reach) if rigid is None else rigid)
@@ -256,10 +238,11 @@ class SpaceEnumeration(Enumeration[SpaceSolvers]):
         root = self.certifier.certified.verified[codes]
         if isinstance(root, LooseSolution):
             angles = self._loose_angles(root)
-            bounds = self._loose_bounds(root) if self.arithmetic == "verified" else None
+            bounds = self._enclosure(root.y, root.w) if self.arithmetic == "verified" else None
         else:
             angles, bounds = self._angles(codes, root), self._root_enclosure(codes, root)
-        return Undecided(_names(codes), _DOUBTFUL, "perturb the load", slip_angle=angles, bounds=bounds)
+        reason = "two leaves hold roots that could not be told apart"
+        return Undecided(_names(codes), reason, "perturb the load", slip_angle=angles, bounds=bounds)
 
 
 def _names(codes: Codes) -> tuple[ContactStatus | str | None, ...]:
@@ -272,9 +255,6 @@ def _common(leaves: Sequence[tuple[ContactStatus | str | None, ...]]) -> tuple[C
     """Status of every node in all leaves; "contact" or None where they differ."""
     nodes = [set(names) for names in zip(*leaves, strict=True)]
     return tuple(node.pop() if len(node) == 1 else None if ContactStatus.OPEN in node else "contact" for node in nodes)
-
-
-_DOUBTFUL = "two leaves hold roots that could not be told apart"
 
 
 def _possible(found: LooseSolution, i: int, u_t: Floats, *, rubs: bool) -> list[ContactStatus]:

@@ -3,31 +3,37 @@
 from __future__ import annotations
 
 import hashlib
+from collections import Counter
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Literal
+from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 import scipy.sparse as sp
 
 from enumsol.errors import InvalidArgumentError
+from enumsol.model.mesh import mass_fingerprint
 from enumsol.model.statuses import SLIP, STATUSES, ContactStatus
+from enumsol.proof.proof_file import PROOF_VERSION
+from enumsol.proof.stability_records import DOES_NOT, RUNS_AWAY, UNDECIDED, VERDICTS, certificate_record, root_record
+from enumsol.proof.writer import ProofWriter
 from enumsol.search.stability import Proven, StabilitySearch
 from enumsol.support.arguments import shown
 from enumsol.support.immutable import Sealed
 from enumsol.support.messages import counted
 from enumsol.trusted.motions_of_body import BodyMotions, Setting, friction_directions, friction_over
-from enumsol.trusted.running_away import Motion, left_open
+from enumsol.trusted.running_away import left_open
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Sequence
+    from collections.abc import Iterable, Iterator, Sequence
+    from pathlib import Path
 
     from enumsol.arithmetic.balls import Ball
     from enumsol.model.problem3d import AnyProblem
+    from enumsol.proof.proof_file import Proof
     from enumsol.roots.root import Root
     from enumsol.support.array_types import ArrayLike, Floats
 
 Verdict = Literal["runs away", "does not run away", "undecided"]
-_OPEN, _PLUS, _MINUS = ContactStatus.OPEN, ContactStatus.SLIP_PLUS, ContactStatus.SLIP_MINUS
 _CODES = {status: code for code, status in enumerate(STATUSES)} | {ContactStatus.SLIP: SLIP}
 
 
@@ -110,17 +116,41 @@ def stability(
     return asked.of(root)
 
 
-class Equilibria:
-    """Roots of one problem, and the motions that may begin there.
+class Stabilities:
+    """Verdicts on roots of one problem; parts that nothing connects are examined by themselves and only once.
+
+    Parameters
+    ----------
+    problem : ContactProblem or ContactProblem3D
+    mass : (n, n) array_like or sparse, or None
+        In place of ``problem.inertia``.
+    known : dict, optional
+        What was proven with this mass before.
+    at_rest : bool
+        Only the motions that may begin are asked for, at rates of the load, which takes no mass.
 
     Attributes
     ----------
-    problem : ContactProblem or ContactProblem3D
     body : BodyMotions
+
+    Raises
+    ------
+    InvalidProblemError
+        The mass cannot be used.
+    InvalidArgumentError
+        There is none, or friction depends on the solution.
     """
 
-    def __init__(self, problem: AnyProblem, body: BodyMotions) -> None:
-        self.problem, self.body = problem, body
+    def __init__(
+        self,
+        problem: AnyProblem,
+        mass: ArrayLike | sp.sparray | sp.spmatrix | None = None,
+        known: dict[bytes, Proven] | None = None,
+        *,
+        at_rest: bool = False,
+    ) -> None:
+        self.problem, self.body = problem, BodyMotions(problem, mass, at_rest=at_rest)
+        self.known = {} if known is None else known
 
     def check(self, root: Root) -> None:
         """Refuse what is no root of this problem."""
@@ -134,10 +164,11 @@ class Equilibria:
         """Why the statuses of a root do not tell enough."""
         if root.enclosure is None:
             return "the root was found in floats, and its statuses are not proven"
-        if any(_OPEN in root.active[i] for i in self._unsure(root)):
+        if any(ContactStatus.OPEN in root.active[i] for i in self._unsure(root)):
             return "a contact node may be open or touch, which the bounds of this root do not decide"
         rubs = np.any([F.mid > 0 for F in friction_over(self.problem, root.alpha, root.alpha)], axis=0)
-        if any(rubs[i] and {_PLUS, _MINUS} <= root.active[i] for i in self._unsure(root)):
+        limits = {ContactStatus.SLIP_PLUS, ContactStatus.SLIP_MINUS}
+        if any(rubs[i] and limits <= root.active[i] for i in self._unsure(root)):
             return "a contact node may be at either limit, which the bounds of this root do not decide"
         return None
 
@@ -168,35 +199,6 @@ class Equilibria:
             return ()
         return tuple(i for i, statuses in enumerate(root.active) if len(statuses) > 1)
 
-
-class Stabilities(Equilibria):
-    """Verdicts on roots of one problem; parts that nothing connects are examined by themselves and only once.
-
-    Parameters
-    ----------
-    problem : ContactProblem or ContactProblem3D
-    mass : (n, n) array_like or sparse, or None
-        In place of ``problem.inertia``.
-    known : dict, optional
-        What was proven with this mass before.
-
-    Raises
-    ------
-    InvalidProblemError
-        The mass cannot be used.
-    InvalidArgumentError
-        There is none, or friction depends on the solution.
-    """
-
-    def __init__(
-        self,
-        problem: AnyProblem,
-        mass: ArrayLike | sp.sparray | sp.spmatrix | None = None,
-        known: dict[bytes, Proven] | None = None,
-    ) -> None:
-        super().__init__(problem, BodyMotions(problem, mass))
-        self.known = {} if known is None else known
-
     def of(self, root: Root) -> Stability:
         """The verdict on one root."""
         if (reason := self.not_known(root)) is not None:
@@ -209,9 +211,9 @@ class Stabilities(Equilibria):
             gaps += proven.gaps
             if not proven.growing and not proven.gaps and (ends := left_open(proven.leaves)) is not None:
                 gaps.append(ends)
-            for _, motion in proven.growing:
-                rate = float(np.sqrt(0.5 * sum(motion.mu)))
-                found.append((rate, rate_bounds(*motion.mu), self._shape(setting, motion)))
+            for own, x in proven.growing:
+                mu = 0.5 * (own.low + own.high)
+                found.append((float(np.sqrt(mu)), rate_bounds(own.low, own.high), self._shape(setting, own.low, mu, x)))
         if found:
             found.sort(key=lambda item: -item[0])
             rates, bounds, shapes = zip(*found, strict=True)
@@ -241,12 +243,12 @@ class Stabilities(Equilibria):
             self.known[key.digest()] = StabilitySearch(setting.stiffness, motions).run()
         return self.known[key.digest()]
 
-    def _shape(self, setting: Setting, motion: Motion) -> Floats:
-        """Displacements of a motion that grows, (n,), in floats."""
-        K = setting.stiffness.at(motion.mu[0])
+    def _shape(self, setting: Setting, low: float, mu: float, x: Ball) -> Floats:
+        """Displacements of a motion that grows, (n,), in floats; mu is from ``low`` on."""
+        K = setting.stiffness.at(low)
         assert K is not None
-        forces = -(K.mid @ (setting.motions.moves.mid @ motion.x.mid))
-        v = displacement(setting, 0.5 * sum(motion.mu), np.zeros(len(setting.dofs)), forces)
+        forces = -(K.mid @ (setting.motions.moves.mid @ x.mid))
+        v = displacement(setting, mu, np.zeros(len(setting.dofs)), forces)
         whole = np.zeros(self.problem.n)
         whole[setting.dofs] = v / np.max(np.abs(v))
         return whole
@@ -266,3 +268,64 @@ def displacement(setting: Setting, mu: float, load: Floats, forces: Floats) -> F
     if not mu and not stiffness.held:
         A = A + stiffness.springs
     return Factorization(sp.csc_array(A)).solve(load - stiffness.rows.T @ forces)
+
+
+def write_proof(
+    proof: Proof, roots: Iterable[Root], asked: Stabilities, found: Iterable[Stability], path: str | Path | None
+) -> Proof:
+    """The proof of verdicts ``found`` on roots, after the ``proof`` of these.
+
+    Raises
+    ------
+    InvalidArgumentError
+        The file cannot be written.
+    """
+    # the new proof may take the place of the file
+    records, problem = list(proof.records()), asked.problem
+    writer = ProofWriter(path)
+    writer.write(
+        {
+            "format": "enumsol-proof",
+            "version": PROOF_VERSION,
+            "kind": "stability",
+            "problem": problem.fingerprint,
+            "p": problem.p,
+            "mass": mass_fingerprint(asked.body.mass),
+        }
+    )
+    for record in records:
+        writer.write(record)
+    counts: Counter[str] = Counter()
+    for root, own in zip(roots, found, strict=True):
+        verdict, certificates = _certified(asked, root, own)
+        counts[verdict] += 1
+        writer.write(root_record(np.concatenate([root.lambda_n, np.asarray(root.lambda_t).T.ravel()]), verdict))
+        for record in certificates:
+            writer.write(record)
+    writer.write({"roots": counts.total(), **{verdict: counts[verdict] for verdict in VERDICTS}})
+    written = writer.close()
+    if writer.failure is not None:
+        raise InvalidArgumentError(writer.failure)
+    return written
+
+
+def _certified(asked: Stabilities, root: Root, found: Stability) -> tuple[str, list[Any]]:
+    """Verdict that follows from the proof of the roots alone, and the records of its certificates."""
+    if found.verdict == UNDECIDED or not _strict(root):
+        return UNDECIDED, []
+    parts = list(asked.examined(root))
+    if found.verdict == RUNS_AWAY:
+        growing = ((k, proven.growing[0]) for k, (_, proven) in enumerate(parts) if proven.growing)
+        k, (certificate, _) = max(growing, key=lambda item: item[1][0].low)
+        return RUNS_AWAY, [certificate_record(k, certificate)]
+    records = []
+    for k, (_, proven) in enumerate(parts):
+        records += [certificate_record(k, leaf) for leaf in dict.fromkeys(proven.leaves)]
+    return DOES_NOT, records
+
+
+def _strict(root: Root) -> bool:
+    """True if every node with a choice has one status, and surely touches or not."""
+    return all(len(held) == 1 or ContactStatus.OPEN not in held for held in root.active) and (
+        root.regular or all(len(held) == 1 for held in root.active)
+    )

@@ -115,7 +115,7 @@ class SelectionCurve:
         w, dw = g - W @ y, np.asarray(system.g1 - W @ dy - dW @ y)
         force, slope = rows.forces(y, F), rows.forces(dy, F) + rows.forces(y, F1, unit=0)
         widens, cones = np.zeros(len(rows.conditions)), len(rows.moving) + len(rows.closed)
-        widens[cones : cones + 2 * len(rows.stick)] = np.tile(F1[rows.stick] * y[rows.stick_columns], 2)
+        widens[cones : cones + 2 * len(rows.stick)] = np.tile(F1[rows.stick] * y[rows.normal], 2)
         bounds = (system.reach, 0.0 * system.reach) if len(system.reach) else (None, None)
         return force, w, rows.slacks(y, w, F, bounds[0]), slope, dw, rows.slacks(dy, dw, F, bounds[1]) + widens
 

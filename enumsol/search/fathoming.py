@@ -21,9 +21,8 @@ from enumsol.model.statuses import (
     STICK,
     UNDECIDED,
 )
-from enumsol.search.closing import TreeCloser
-from enumsol.search.fathoming_in_contact import KnownRoot, Lone, LoneProposal
-from enumsol.search.reduction import NEAR, Proposal, Reduction, WeightSource
+from enumsol.search.nodes import TreeCloser
+from enumsol.search.reduction import NEAR, KnownRoot, Lone, LoneProposal, Proposal, Reduction, WeightSource
 from enumsol.selections.solution import ActiveSets, SelectionSolution
 
 if TYPE_CHECKING:

@@ -16,7 +16,7 @@ from enumsol.arithmetic.balls import Ball
 from enumsol.errors import InvalidProblemError
 from enumsol.model.statuses import OPEN, SLIP_MINUS, SLIP_PLUS, STICK
 from enumsol.support.deadlines import look
-from enumsol.trusted.running_away import Behaviour, Crossing, Growing, Motion, Motions
+from enumsol.trusted.running_away import Behaviour, Crossing, Growing, Motions
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
@@ -26,164 +26,155 @@ if TYPE_CHECKING:
 
 #: From one end of a range of mu to the other.
 STRIDE = 16.0
-#: Nodes at their limit up to which all sets of them are tried, and degrees of freedom up to which a spectrum is known.
+#: Nodes at their limit up to which all sets of them are tried or counted, and degrees of freedom up to which a
+#: spectrum is known.
 _ALL_SETS, _SPECTRUM = 8, 1500
-#: Nodes up to which all sets of them are counted for one certificate, and loads that are tried for it.
-_COUNTED, _LOADS = 8, 12
+#: Loads that are tried for one certificate.
+_LOADS = 12
 #: mu at which signs of determinants are compared within a range.
 _SAMPLES = 48
 #: Relative widths in which a motion is looked for, narrow ones first.
 _WIDTHS = (1e-8, 1e-6, 1e-4, 1e-3)
 
 
-class GrowingMotions:
-    """The search for motions that grow, of one equilibrium.
+def growing_between(
+    stiffness: DynamicStiffness, motions: Motions, low: float, high: float
+) -> Iterator[tuple[Growing, Ball]]:
+    """Motions proven to grow in a range."""
+    low = low if low > 0 else 1e-6 * smallest_eigenvalue(stiffness)
+    high = high if np.isfinite(high) else 1e4 * max(low, largest_eigenvalue(stiffness))
+    count = max(_SAMPLES, int(_SAMPLES * np.log(high / low) / np.log(STRIDE)))
+    samples = np.geomspace(low, high, count)
+    floats = Spectrum.of(stiffness)
+    if floats is None:
+        samples = samples[:: max(1, count // 12)]
+    model = floats or stiffness
+    known = [(mu, K.mid) for mu in samples.tolist() if (K := model.at(mu)) is not None]
+    values = [K for _, K in known]
+    seen, stack = set[float](), np.array(values)
+    for slides, touching in _candidates(motions, values):
+        look()
+        way = Behaviour(slides, touching)
+        rows = way.equations(motions)
+        if rows is None or not rows[1]:
+            continue
+        left, right = rows[0].mid, motions.moves.mid[:, rows[1]]
+        signed = motions.signed[rows[1]]
 
-    Parameters
-    ----------
-    stiffness : DynamicStiffness
-    motions : Motions
-    """
+        def matrices(mu: float, left: Floats = left, right: Floats = right) -> Floats:
+            K = model.at(mu)
+            return np.full((1, right.shape[1], right.shape[1]), np.nan) if K is None else (left.T @ K.mid @ right)[None]
 
-    def __init__(self, stiffness: DynamicStiffness, motions: Motions) -> None:
-        self.stiffness, self.motions = stiffness, motions
+        zeros: list[float | None] = []
+        for function in (_determinant, partial(_forward, signed=signed)):
 
-    def between(self, low: float, high: float) -> Iterator[tuple[Growing, Motion]]:
-        """Motions proven to grow in a range."""
-        low = low if low > 0 else 1e-6 * smallest_eigenvalue(self.stiffness)
-        high = high if np.isfinite(high) else 1e4 * max(low, largest_eigenvalue(self.stiffness))
-        count = max(_SAMPLES, int(_SAMPLES * np.log(high / low) / np.log(STRIDE)))
-        samples = np.geomspace(low, high, count)
-        floats = Spectrum.of(self.stiffness)
-        if floats is None:
-            samples = samples[:: max(1, count // 12)]
-        model = floats or self.stiffness
-        known = [(mu, K.mid) for mu in samples.tolist() if (K := model.at(mu)) is not None]
-        values = [K for _, K in known]
-        seen, stack = set[float](), np.array(values)
-        for slides, touching in self._candidates(values):
-            look()
-            way = Behaviour(slides, touching)
-            rows = way.equations(self.motions)
-            if rows is None or not rows[1]:
+            def value(mu: float, function: Callable[[Floats], Floats] = function, of: Any = matrices) -> float:
+                return float(function(of(mu))[0])
+
+            signs = np.sign(function(left.T @ stack @ right))
+            changes = np.flatnonzero(signs[:-1] * signs[1:] < 0)
+            zeros += [_zero(value, known[i][0], known[i + 1][0]) for i in changes]
+        for at in zeros:
+            if at is None or any(abs(at - other) <= 1e-6 * at for other in seen):
                 continue
-            left, right = rows[0].mid, self.motions.moves.mid[:, rows[1]]
-            signed = self.motions.signed[rows[1]]
-
-            def matrices(mu: float, left: Floats = left, right: Floats = right) -> Floats:
-                K = model.at(mu)
-                return (
-                    np.full((1, right.shape[1], right.shape[1]), np.nan)
-                    if K is None
-                    else (left.T @ K.mid @ right)[None]
-                )
-
-            zeros: list[float | None] = []
-            for function in (_determinant, partial(_forward, signed=signed)):
-
-                def value(mu: float, function: Callable[[Floats], Floats] = function, of: Any = matrices) -> float:
-                    return float(function(of(mu))[0])
-
-                signs = np.sign(function(left.T @ stack @ right))
-                changes = np.flatnonzero(signs[:-1] * signs[1:] < 0)
-                zeros += [_zero(value, known[i][0], known[i + 1][0]) for i in changes]
-            for at in zeros:
-                if at is None or any(abs(at - other) <= 1e-6 * at for other in seen):
+            for width in _WIDTHS:
+                tried = Growing(at * (1 - width), at * (1 + width), way)
+                if floats is not None and tried.found(floats, motions) is None:
                     continue
-                for width in _WIDTHS:
-                    tried = Growing(at * (1 - width), at * (1 + width), way)
-                    if floats is not None and tried.found(floats, self.motions) is None:
-                        continue
-                    found = tried.found(self.stiffness, self.motions)
-                    if found is not None:
-                        seen.add(at)
-                        yield tried, found
-                        break
+                found = tried.found(stiffness, motions)
+                if found is not None:
+                    seen.add(at)
+                    yield tried, found
+                    break
 
-    def crossing_near(self, known: Growing) -> Crossing | None:
-        """A range of mu in which some motion is proven to grow, about one that is known for other coefficients."""
-        unit = float(np.exp2(np.round(np.log2(known.low))))
-        below, above = (unit / 4, unit / STRIDE, unit / STRIDE**2, 0.0), [unit * STRIDE**k for k in range(1, 6)]
-        for pushed, definite in ((below, above), (above, below)):
-            end = next((mu for mu in definite if serve_at(self.stiffness, self.motions, mu)), None)
-            if end is None:
-                continue
-            for mu in pushed:
-                K = self.stiffness.at(mu)
-                L = None if K is None else self.motions.slopes.mid.T @ K.mid @ self.motions.moves.mid
-                push = None if L is None else _push(L)
-                load = None if L is None or push is not None or not mu else _load(L)
-                tried = Crossing(min(mu, end), max(mu, end), push, load)
-                if tried.holds(self.stiffness, self.motions):
-                    return tried
+
+def crossing_near(stiffness: DynamicStiffness, motions: Motions, known: Growing) -> Crossing | None:
+    """A range of mu in which some motion is proven to grow, about one that is known for other coefficients."""
+    unit = float(np.exp2(np.round(np.log2(known.low))))
+    below, above = (unit / 4, unit / STRIDE, unit / STRIDE**2, 0.0), [unit * STRIDE**k for k in range(1, 6)]
+    for pushed, definite in ((below, above), (above, below)):
+        end = next((mu for mu in definite if serve_at(stiffness, motions, mu)), None)
+        if end is None:
+            continue
+        for mu in pushed:
+            K = stiffness.at(mu)
+            L = None if K is None else motions.slopes.mid.T @ K.mid @ motions.moves.mid
+            push = None if L is None else _push(L)
+            load = None if L is None or push is not None or not mu else _load(L)
+            tried = Crossing(min(mu, end), max(mu, end), push, load)
+            if tried.holds(stiffness, motions):
+                return tried
+    return None
+
+
+def zero_near(stiffness: DynamicStiffness, motions: Motions, known: Growing) -> float | None:
+    """About the mu at which a motion grows that grew at another one under slightly other coefficients."""
+    rows, model = known.way.equations(motions), Spectrum.of(stiffness)
+    if rows is None or model is None:
+        return 0.5 * (known.low + known.high)
+    left, right, signed = rows[0].mid, motions.moves.mid[:, rows[1]], motions.signed[rows[1]]
+    samples = 0.5 * (known.low + known.high) * np.geomspace(0.125, 8.0, 24)
+    forces = [None if (K := model.at(mu)) is None else left.T @ K.mid @ right for mu in samples.tolist()]
+    if any(of is None for of in forces):
         return None
+    values = _forward(np.array(forces), signed)
+    changes = np.flatnonzero(np.sign(values[:-1]) * np.sign(values[1:]) < 0)
+    if not len(changes):
+        return None
+    i = int(changes[np.argmin(np.abs(changes - 11.5))])
+    share = values[i] / (values[i] - values[i + 1])
+    return float(samples[i] * (samples[i + 1] / samples[i]) ** share)
 
-    def zero_near(self, known: Growing) -> float | None:
-        """About the mu at which a motion grows that grew at another one under slightly other coefficients."""
-        rows, model = known.way.equations(self.motions), Spectrum.of(self.stiffness)
-        if rows is None or model is None:
-            return 0.5 * (known.low + known.high)
-        left, right, signed = rows[0].mid, self.motions.moves.mid[:, rows[1]], self.motions.signed[rows[1]]
-        samples = 0.5 * (known.low + known.high) * np.geomspace(0.125, 8.0, 24)
-        forces = [None if (K := model.at(mu)) is None else left.T @ K.mid @ right for mu in samples.tolist()]
-        if any(of is None for of in forces):
-            return None
-        values = _forward(np.array(forces), signed)
-        changes = np.flatnonzero(np.sign(values[:-1]) * np.sign(values[1:]) < 0)
-        if not len(changes):
-            return None
-        i = int(changes[np.argmin(np.abs(changes - 11.5))])
-        share = values[i] / (values[i] - values[i + 1])
-        return float(samples[i] * (samples[i + 1] / samples[i]) ** share)
 
-    def _candidates(self, values: list[Floats]) -> Iterator[tuple[tuple[int, ...], tuple[int, ...]]]:
-        """Sets of nodes that may slide, with statuses of those that touch."""
-        limits, touching = self.motions.limits, self.motions.touching
-        codes = [(STICK, OPEN, SLIP_PLUS, SLIP_MINUS)[: 4 if len(node.slides) == 1 else 2] for node in touching]
-        statuses = (
-            list(itertools.product(*codes)) if limits + 2 * len(touching) <= _ALL_SETS else [(STICK,) * len(touching)]
-        )
-        known = set()
-        for value in values:
-            for slides in self._settled(value):
+def _candidates(motions: Motions, values: list[Floats]) -> Iterator[tuple[tuple[int, ...], tuple[int, ...]]]:
+    """Sets of nodes that may slide, with statuses of those that touch."""
+    limits, touching = motions.limits, motions.touching
+    codes = [(STICK, OPEN, SLIP_PLUS, SLIP_MINUS)[: 4 if len(node.slides) == 1 else 2] for node in touching]
+    statuses = (
+        list(itertools.product(*codes)) if limits + 2 * len(touching) <= _ALL_SETS else [(STICK,) * len(touching)]
+    )
+    known = set()
+    for value in values:
+        for slides in _settled(motions, value):
+            if slides not in known:
+                known.add(slides)
+                yield from ((slides, status) for status in statuses)
+    if limits <= _ALL_SETS:
+        for size in range(1, limits + 1):
+            for slides in itertools.combinations(range(limits), size):
                 if slides not in known:
-                    known.add(slides)
                     yield from ((slides, status) for status in statuses)
-        if limits <= _ALL_SETS:
-            for size in range(1, limits + 1):
-                for slides in itertools.combinations(range(limits), size):
-                    if slides not in known:
-                        yield from ((slides, status) for status in statuses)
 
-    def _settled(self, K: Floats) -> Iterator[tuple[int, ...]]:
-        """Sets of nodes that slide in complementary eigenvectors of T'K R, found by changing them until they fit."""
-        count = self.motions.limits
-        L = self.motions.slopes.mid.T @ K @ self.motions.moves.mid[:, :count]
-        if not np.all(np.isfinite(L)):
+
+def _settled(motions: Motions, K: Floats) -> Iterator[tuple[int, ...]]:
+    """Sets of nodes that slide in complementary eigenvectors of T'K R, found by changing them until they fit."""
+    count = motions.limits
+    L = motions.slopes.mid.T @ K @ motions.moves.mid[:, :count]
+    if not np.all(np.isfinite(L)):
+        return
+    L = L / np.max(np.abs(L))
+    chosen = np.ones(count, dtype=bool)
+    for _ in range(2 * count):
+        own = np.flatnonzero(chosen)
+        if not len(own):
             return
-        L = L / np.max(np.abs(L))
-        chosen = np.ones(count, dtype=bool)
-        for _ in range(2 * count):
-            own = np.flatnonzero(chosen)
-            if not len(own):
-                return
-            values, vectors = np.linalg.eig(L[np.ix_(own, own)])
-            real = np.flatnonzero(np.abs(values.imag) <= 1e-9)
-            if not len(real):
-                return
-            best = real[np.argmin(values.real[real])]
-            x = np.zeros(count)
-            x[own] = vectors[:, best].real * np.sign(np.sum(vectors[:, best].real))
-            r = L @ x
-            backward = own[x[own] < 0]
-            inward = np.flatnonzero(~chosen & (r < 0))
-            if not len(backward) and not len(inward):
-                yield tuple(own.tolist())
-                return
-            if len(backward):
-                chosen[backward] = False
-            else:
-                chosen[inward[np.argmin(r[inward])]] = True
+        values, vectors = np.linalg.eig(L[np.ix_(own, own)])
+        real = np.flatnonzero(np.abs(values.imag) <= 1e-9)
+        if not len(real):
+            return
+        best = real[np.argmin(values.real[real])]
+        x = np.zeros(count)
+        x[own] = vectors[:, best].real * np.sign(np.sum(vectors[:, best].real))
+        r = L @ x
+        backward = own[x[own] < 0]
+        inward = np.flatnonzero(~chosen & (r < 0))
+        if not len(backward) and not len(inward):
+            yield tuple(own.tolist())
+            return
+        if len(backward):
+            chosen[backward] = False
+        else:
+            chosen[inward[np.argmin(r[inward])]] = True
 
 
 def serve_at(stiffness: DynamicStiffness, motions: Motions, mu: float) -> bool:
@@ -286,7 +277,7 @@ def _push(L: Floats) -> Floats | None:
 def _load(L: Floats) -> Floats | None:
     """q for which the signs of all solutions of 0 <= x, q + L x >= 0 are known best, if they do not add up to 1."""
     k = len(L)
-    if not 0 < k <= _COUNTED or L.shape != (k, k):
+    if not 0 < k <= _ALL_SETS or L.shape != (k, k):
         return None
     unit = 1.0 / np.sqrt(np.maximum(np.abs(L.diagonal()), np.finfo(float).tiny))
     scaled = L * unit[:, None] * unit

@@ -17,8 +17,8 @@ from typing import TYPE_CHECKING, NamedTuple
 
 from enumsol.model.statuses import CONTACT, OPEN, UNDECIDED
 from enumsol.relaxation.active_set import ActiveSetEngine, IntervalSystem, PieceForm, interval_rows
-from enumsol.search.form_policy import PairedTerms, better_form
-from enumsol.search.splitting import ImposedRows, PlaneSplitting, branching_node
+from enumsol.search.nodes import PairedTerms, Relaxations, better_form
+from enumsol.search.splitting import PlaneSplitting, branching_node
 from enumsol.support.deadlines import Deadline, TimeOverError, within
 
 if TYPE_CHECKING:
@@ -31,8 +31,6 @@ if TYPE_CHECKING:
 TRIED_AT_ONCE = 2
 #: Nodes spent at the end on all that is to be left: without anything left there are no halves, which cost as much.
 TRIED_AT_THE_END = 128
-#: What was left so many times in a row gets twice as many nodes every further time: some alpha may be an event of it.
-PATIENCE = 2
 #: Nodes of one tree, after which the rest of it goes to further trees over the same piece.
 LARGEST_TREE = 4096
 #: A tree that leaves so many subtrees more than two for each of its roots is given up.
@@ -121,19 +119,9 @@ class IntervalSplitting(PlaneSplitting):
         return interval_rows(code, friction=self.friction[node], constant=self._constant[node])
 
 
-class _Program:
+def _program(system: IntervalSystem, form: PieceForm | None = None) -> Relaxations:
     """Relaxations over one piece, or at one alpha."""
-
-    def __init__(self, system: IntervalSystem, form: PieceForm | None = None) -> None:
-        self.splitting = IntervalSplitting(system)
-        self._engine, self._p = ActiveSetEngine.over(system, form), system.p
-        self._rows = ImposedRows(self.splitting, system.p)
-
-    def relax(self, item: _Item, parent: Relaxation | None) -> Relaxation:
-        """The relaxation of a node, from its parent's if that is there."""
-        nodes = range(self._p) if parent is None else item.changed
-        rows, modes = self._rows.over(item.codes, nodes)
-        return self._engine.root(rows, modes) if parent is None else parent.child(rows, modes, last=item.last)
+    return Relaxations(ActiveSetEngine.over(system, form), IntervalSplitting(system), system.p)
 
 
 @dataclass(slots=True)
@@ -196,7 +184,7 @@ class SubintervalTree:
         self._result = TreeResult()
         self._form: PairedTerms | None = None
         self._multipliers: Floats | None = None
-        self._over, self._middle = _Program(system), None if middle is None else _Program(middle)
+        self._over, self._middle = _program(system), None if middle is None else _program(middle)
 
     def run(self, roots: Sequence[Subtree], max_nodes: int, deadline: float | None = None) -> TreeResult:
         """Search below the roots, which are leaves of one tree, until a limit is reached."""
@@ -254,15 +242,16 @@ class SubintervalTree:
         elif middle is not None:
             at_middle = PieceForm.of(middle, form.multipliers(middle.F_lo))
         self._form, self._multipliers = form, multipliers
-        self._over = _Program(self._system, over)
-        self._middle = None if middle is None else _Program(middle, at_middle)
+        self._over = _program(self._system, over)
+        self._middle = None if middle is None else _program(middle, at_middle)
         return form is not None
 
     def _try_again(self, max_nodes: int) -> None:
         """A last attempt at what is to be left to the halves, if it is little."""
         tried, self._result.cut = self._result.cut, []
         for subtree in tried:
-            nodes = TRIED_AT_THE_END * 2 ** max(0, subtree.left - PATIENCE) // len(tried)
+            # left so often in a row, some alpha may be an event of it: twice as many nodes every further time
+            nodes = TRIED_AT_THE_END * 2 ** max(0, subtree.left - 2) // len(tried)
             nodes = min(nodes, max_nodes - self._result.nodes)
             if nodes < 4 * TRIED_AT_ONCE or not self._settled([_first([subtree])], nodes):
                 self._result.cut.append(subtree)
@@ -278,11 +267,11 @@ class SubintervalTree:
             del result.empty[kept[0] :], result.selections[kept[1] :]
         return not stack
 
-    def _examine(self, item: _Item, middle: _Program | None) -> list[_Item]:
+    def _examine(self, item: _Item, middle: Relaxations | None) -> list[_Item]:
         """Settle one node of the tree, or give its children in the order in which they are examined."""
         result = self._result
         result.nodes += 1
-        over: Relaxation | None = self._over.relax(item, item.over)
+        over: Relaxation | None = self._over.below(item.over, item.codes, item.changed, last=item.last)
         assert over is not None
         if over.pruned and self._empty(item, over):
             return []
@@ -295,7 +284,7 @@ class SubintervalTree:
             # what is empty at the middle is so with more statuses too
             if at_middle is None or not at_middle.pruned:
                 result.nodes += 1
-                at_middle = middle.relax(item, at_middle)
+                at_middle = middle.below(at_middle, item.codes, item.changed, last=item.last)
                 at_middle = None if at_middle.stalled else at_middle
         if item.above:
             return _towards_roots(item, over, at_middle)

@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import enum
-import time
 from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING
 
+from enumsol.support.deadlines import Deadline
 from enumsol.support.messages import counted
 
 if TYPE_CHECKING:
@@ -56,21 +56,11 @@ class SearchProgress:
 
 
 @dataclass
-class SearchLimits:
+class SearchLimits(Deadline):
     """When to stop early."""
 
     enough: Callable[[list[SelectionSolution]], bool] | None = None
     max_nodes: int | None = None
-    deadline: float | None = None
-
-    @property
-    def over(self) -> bool:
-        """True if the deadline has passed."""
-        return self.deadline is not None and time.perf_counter() > self.deadline
-
-    def remaining(self) -> float | None:
-        """Seconds until the deadline."""
-        return None if self.deadline is None else self.deadline - time.perf_counter()
 
 
 @dataclass

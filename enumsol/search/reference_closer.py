@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple, Protocol, TypeVar
 import numpy as np
 
 from enumsol.model.statuses import BACKWARD, FORWARD, OPEN, SLIP_MINUS, SLIP_PLUS, STICK, UNDECIDED
-from enumsol.search.closing import TreeCloser
+from enumsol.search.nodes import TreeCloser
 from enumsol.support.deadlines import look
 from enumsol.trusted.at_alpha import solve_selection
 from enumsol.trusted.floating_bounds import is_unbalanced, motion_against

@@ -6,7 +6,7 @@ import warnings
 from contextlib import suppress
 from dataclasses import replace
 from fractions import Fraction
-from functools import cached_property, partial
+from functools import cache, cached_property, partial
 from typing import TYPE_CHECKING, Literal, TypeVar
 
 import numpy as np
@@ -18,36 +18,33 @@ from enumsol.model.statuses import UNDECIDED
 from enumsol.proof.records import Limits, Tree
 from enumsol.proof.writer import Recorder
 from enumsol.relaxation.active_set import ActiveSetEngine
-from enumsol.relaxation.engine import Engine, not_compiled
+from enumsol.relaxation.engine import PRUNE_MARGIN, Engine, not_compiled
 from enumsol.relaxation.interior_point import InteriorPointEngine
 from enumsol.search.certifiers.exclusions import Exclusions
-from enumsol.search.certifiers.float_certifier import FastCertifier
+from enumsol.search.certifiers.protocol import Bound, Certifier, UndecidedPart, margin_of_form, solve_or_open
 from enumsol.search.certifiers.verified import VerifiedCertifier
-from enumsol.search.closing import TreeCloser
-from enumsol.search.fathoming import Closer, propose
-from enumsol.search.form_policy import Forms, plane_forms
-from enumsol.search.nodes import Relaxations
-from enumsol.search.reduction import WeightSource
+from enumsol.search.fathoming import Closer, holds_below, propose, without_load
+from enumsol.search.nodes import Forms, Relaxations, TreeCloser, plane_forms
+from enumsol.search.reduction import NEAR, WeightSource
 from enumsol.search.reference_closer import LeadingCloser
-from enumsol.search.resume import Reader
 from enumsol.search.setup import WEAK, SearchSetup, weakly_held
 from enumsol.search.splitting import PlaneSplitting
 from enumsol.search.tree import TreeSearch
 from enumsol.selections.float_selections import FloatSelections
+from enumsol.selections.solution import SelectionSolution
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
     from enumsol.condensation.condensed import ScaledSystem
     from enumsol.model.problem import ContactProblem
-    from enumsol.search.certifiers.protocol import Certifier
     from enumsol.search.certifiers.rational_certifier import ExactCertifier
     from enumsol.search.outcome import SearchLimits
-    from enumsol.search.reduction import Point
+    from enumsol.search.reduction import Point, Proposal
     from enumsol.selections.rational_selections import ExactSelections
     from enumsol.support.array_types import Alpha, Codes, Floats
-    from enumsol.trusted.arcs.precise import PreciseAtAlpha
     from enumsol.trusted.at_alpha import VerifiedSelection
+
 
 Arithmetic = Literal["fast", "verified", "exact"]
 _T = TypeVar("_T")
@@ -255,7 +252,7 @@ class Solvers(SearchSetup):
 
     def _solved_precisely(self, codes: Codes) -> VerifiedSelection | None:
         """The verified solution of a complete selection in many digits; None where that is not to be had."""
-        return None if self._precise is None else self._precise.solve(codes)
+        return None if self._precise is None else self._precise(codes)
 
     def _index(self, codes: Codes) -> int:
         """The sign of det M of a selection where many digits show it, else 0."""
@@ -263,14 +260,14 @@ class Solvers(SearchSetup):
         return 0 if found is None else found.index
 
     @cached_property
-    def _precise(self) -> PreciseAtAlpha | None:
-        """The problem at this alpha in many digits; None for small ones, which rationals decide as fast."""
+    def _precise(self) -> Callable[[Codes], VerifiedSelection | None] | None:
+        """Solutions of selections in many digits; None for small ones, which rationals decide as fast."""
         from enumsol.condensation.exact import FAST_EXACT_DOF
-        from enumsol.trusted.arcs.precise import PreciseAtAlpha  # python-flint
+        from enumsol.trusted.arcs.precise import verified_in_many_digits  # python-flint
 
         if self.problem.n <= FAST_EXACT_DOF or self.data == "condensed" or not self.problem.held:
             return None
-        return PreciseAtAlpha.of(self.problem, Fraction(self.alpha), self.scaled.force, self.scaled.length)
+        return verified_in_many_digits(self.problem, Fraction(self.alpha), self.scaled.force, self.scaled.length)
 
     @cached_property
     def _engine(self) -> Engine:
@@ -316,15 +313,68 @@ class Solvers(SearchSetup):
             return not any(_present(self.exact).system.g)
         return super().unloaded()
 
-    def reader(self) -> Reader:
-        """Understands the records of an earlier proof."""
-        system, F = self.enclosed, (self.scaled.F > 0).tolist()
+    @property
+    def limits(self) -> Limits:
+        """Limits of the records at the root of the tree of a proof."""
         tree = Tree.PLANE if self.problem.held else Tree.FLOATING_PLANE
-        limits = Limits((UNDECIDED,) * self.problem.p, tree, F, modes=self.problem.modes.r)
-        return Reader(limits, system)
+        return Limits((UNDECIDED,) * self.problem.p, tree, (self.scaled.F > 0).tolist(), modes=self.problem.modes.r)
 
 
 def _present(value: _T | None) -> _T:
     if value is None:
         raise AssertionError("this arithmetic has no such solver")
     return value
+
+
+#: A condition is broken beyond doubt: one that is broken by less may hold within the tolerance at another point.
+_CLEARLY = 1e-6
+
+
+class FastCertifier(Certifier):
+    """Floats and tolerances: the result of the engine is trusted unless the tolerance could overturn it.
+
+    A condition within the tolerance of zero counts as satisfied. Shifting every row of a certificate by twice that
+    changes its bound by the multipliers times the shift; a pruning that does not survive it is branched on.
+    """
+
+    writes = False
+    # with other numbers forms are definite where they nearly are not: several points may hold within the tolerance
+    plain = True
+
+    def __init__(self, selections: FloatSelections) -> None:
+        self._selections = selections
+        super().__init__()
+        self._norms = selections.row_norms()
+        self._margin_of = cache(partial(margin_of_form, errors=1.0))
+
+    def excluded(self, codes: Codes, relaxation: Bound) -> bool:
+        """Accept the pruning if conditions may be off by twice the tolerance."""
+        rows, values = relaxation.multipliers()
+        shift = float(np.abs(values) @ self._norms[rows])
+        if relaxation.form is not None:
+            # hardly convex: its bound is worth what is left of it after rounding
+            return self._margin_of(relaxation.form)(codes, rows, values) > 2.0 * self._selections.tolerance * shift
+        return relaxation.bound > PRUNE_MARGIN + 2.0 * self._selections.tolerance * shift
+
+    def closed(self, codes: Codes, proposal: Proposal | None, near: Point) -> list[SelectionSolution] | None:
+        """The solutions below a partial assignment, none or one, if it can hold one only; within the tolerance."""
+        solver = self._selections
+        if proposal is None or proposal.weights is None:
+            return None
+        # a point whose conditions hold within the tolerance is nearer than this to the solution of a closed subtree
+        if 2.0 * solver.tolerance * proposal.reduction.sensitivity > 1e-3:
+            return None
+        if proposal.least < -max(_CLEARLY, 2.0 * solver.tolerance):
+            return []
+        solution = solver.solve(proposal.selection)
+        if solution is None or solution.dimension > 0 or not holds_below(codes, solver.active(solution.vertices[0])):
+            return None
+        return [replace(solution, index=proposal.reduction.sign if proposal.least > NEAR else None)]
+
+    def selection(self, codes: Codes) -> SelectionSolution | UndecidedPart | None:
+        """All roots in the selection within the tolerance."""
+        found = solve_or_open(self._selections, codes)
+        if isinstance(found, SelectionSolution) and not found.strict:
+            system, force = self._selections.system, found.vertices[0]
+            self.sliding |= without_load(system, force, system.g - system.S @ force)
+        return found

@@ -8,7 +8,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Protocol
 
 from enumsol.model.statuses import CONTACT, FRICTIONLESS, OPEN, SLIDING, SLIP_MINUS, SLIP_PLUS, STICK, UNDECIDED
-from enumsol.relaxation.imposed_rows import status_rows
+from enumsol.relaxation.engine import status_rows
 from enumsol.trusted.status_rows import is_covering, refines
 
 if TYPE_CHECKING:

@@ -16,7 +16,7 @@ import scipy.sparse as sp
 
 from enumsol.search.growing_motions import (
     STRIDE,
-    GrowingMotions,
+    growing_between,
     largest_eigenvalue,
     serve_at,
     serves,
@@ -24,11 +24,12 @@ from enumsol.search.growing_motions import (
 )
 from enumsol.support.conic import conic_answer
 from enumsol.support.deadlines import look
-from enumsol.trusted.running_away import Growing, Motion, Motions, NoMotion
+from enumsol.trusted.running_away import Growing, Motions, NoMotion
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
 
+    from enumsol.arithmetic.balls import Ball
     from enumsol.condensation.dynamic import DynamicStiffness
     from enumsol.support.array_types import Floats, Integers
 
@@ -52,14 +53,14 @@ class Proven:
     ----------
     leaves : tuple of NoMotion
         Certificates by which nothing grows, by range.
-    growing : tuple of (certificate, Motion)
+    growing : tuple of (certificate, motion x)
         By growth rate, the largest first.
     gaps : tuple of (low, high)
         Ranges of mu of which neither is proven.
     """
 
     leaves: tuple[NoMotion, ...]
-    growing: tuple[tuple[Growing, Motion], ...]
+    growing: tuple[tuple[Growing, Ball], ...]
     gaps: tuple[tuple[float, float], ...]
 
 
@@ -87,8 +88,8 @@ class StabilitySearch:
             # neither a motion nor a range without end can be proven
             return Proven((), (), ((0.0, np.inf),))
         gaps = _joined(list(self._plain()))
-        search = GrowingMotions(self.stiffness, self.motions)
-        growing = [] if self.motions.unsure else [found for low, high in gaps for found in search.between(low, high)]
+        ranges = () if self.motions.unsure else gaps
+        growing = [found for ends in ranges for found in growing_between(self.stiffness, self.motions, *ends)]
         growing.sort(key=lambda item: -item[0].low)
         if not growing and self._limit is not None:
             gaps = [gap for ends in gaps for gap in self._divided(*ends, _NARROWEST, self._by_weights)]
@@ -103,7 +104,8 @@ class StabilitySearch:
         while low < last:
             if self._try(low, np.inf) or (low and self._far and self._try(low, np.inf, *self._far)):
                 return
-            far = next((mu for mu in (STRIDE**2 * high, STRIDE * high) if self._serve_to(low, mu)), None)
+            serving = (mu for mu in (STRIDE**2 * high, STRIDE * high) if serve_at(self.stiffness, self.motions, mu))
+            far = next((mu for mu in serving if self._try(low, mu)), None)
             if far is None:
                 yield from self._divided(low, high, _NARROW, self._by_plain)
             low = high if far is None else far
@@ -111,10 +113,6 @@ class StabilitySearch:
             if self._limit is None and low > largest_eigenvalue(self.stiffness):
                 break
         yield low, np.inf
-
-    def _serve_to(self, low: float, high: float) -> bool:
-        """True if plain numbers serve in a long range."""
-        return serve_at(self.stiffness, self.motions, high) and self._try(low, high)
 
     @cached_property
     def _limit(self) -> Floats | None:

@@ -6,7 +6,8 @@ handed to the certifier as a complete selection when every contact node is decid
 construction: an engine that fails is replaced by the fallback, and where that fails too the node is branched on.
 
 Presolve comes first: contact nodes that one dual step proves open or in contact are branched on before all others, so
-that everything below knows them.
+that everything below knows them. What is left when a search is stopped stays undecided, but for complete selections
+that are decided all the same.
 """
 
 from __future__ import annotations
@@ -14,15 +15,13 @@ from __future__ import annotations
 import time
 from contextlib import suppress
 from dataclasses import replace
+from functools import partial
 from typing import TYPE_CHECKING, Any
 
 from enumsol.proof.writer import KeptRecords
 from enumsol.search.certifiers.protocol import NO_BOUND, Bound, Certifier, Refine, UndecidedPart
-from enumsol.search.closing import TreeCloser
-from enumsol.search.lookahead import Lookahead
-from enumsol.search.nodes import Relaxations, TreeNode
+from enumsol.search.nodes import Lookahead, Relaxations, TreeCloser, TreeNode
 from enumsol.search.outcome import SearchLimits, SearchOutcome, SearchProgress, Stop, StopReason
-from enumsol.search.remainder import Remainder
 from enumsol.search.splitting import branching_node
 from enumsol.support.deadlines import Deadline, TimeOverError, over, tell, within
 
@@ -30,20 +29,119 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
 
     from enumsol.relaxation.engine import Relaxation
-    from enumsol.search.fathoming_in_contact import LoneProposal
-    from enumsol.search.form_policy import Forms
-    from enumsol.search.load_limit import LoadLimit
+    from enumsol.search.nodes import Forms
     from enumsol.search.parts import Answer
+    from enumsol.search.reduction import LoneProposal
     from enumsol.support.array_types import Codes
 
+
+class Remainder:
+    """Subtrees that were left, which stay undecided but for complete selections that are decided all the same.
+
+    Parameters
+    ----------
+    search : TreeSearch
+    known_root : callable, optional
+        Gives the codes of a complete selection that is known to hold a root, or None.
+
+    Attributes
+    ----------
+    continua : callable
+        Gives the codes of complete selections that hold on continua of which solutions were found: a result lists whole
+        families, its proof too.
+    otherwise : str
+        Advice if limits are reached, besides raising them.
+    """
+
+    def __init__(self, search: TreeSearch, known_root: Callable[[], Codes | None] | None = None) -> None:
+        self._search, self._certifier, self._outcome = search, search.certifier, search.outcome
+        self._recorder, self._known_root, self.otherwise = search.certifier.recorder, known_root, ""
+        self.continua: Callable[[], Sequence[Codes]] = list
+        #: Subtrees, and the records that follow each of them.
+        self._left: list[tuple[Codes, KeptRecords]] = []
+
+    def add(self, codes: Codes) -> None:
+        """Leave a subtree."""
+        # which continua reach into it is known once everything is found, also what comes after it
+        self._left.append((codes, KeptRecords(packed=True)))
+        self._certifier.recorder = self._left[-1][1]
+
+    def known(self, limits: Deadline | None = None) -> Codes | None:
+        """Codes of a selection that holds a root, if one is found within limits, by default in a second."""
+        if self._known_root is None:
+            return None
+        try:
+            with within(limits or Deadline.after(time.perf_counter(), 1.0)):
+                return self._known_root()
+        except TimeOverError:
+            self._known_root = None
+            return None
+
+    def add_known(self) -> None:
+        """Add the root that is known, in a search that was interrupted before it came there."""
+        root = self.known()
+        if root is not None and root not in self._certifier.certified.verified:
+            self._search.settled(TreeNode(None, root, -1, last=False, weight=0.0))
+
+    def finish(self) -> None:
+        """Leave undecided what was left, except for complete selections, which are decided if there is time."""
+        left, self._left = self._left, []
+        if not left:
+            return
+        self._certifier.recorder = self._recorder
+        selections = self._wanted()
+        for codes, after in left:
+            self._leave_but(codes, selections)
+            after.release(self._recorder)
+        self._outcome.count_unexamined()
+
+    def _wanted(self) -> list[Codes]:
+        """Complete selections that are decided although the search was stopped."""
+        stopped, root = self._outcome.stopped, None
+        if stopped is None or stopped.reason is not StopReason.ENOUGH_ROOTS:
+            root = self.known()
+        wanted = [] if root is None else [root]
+        try:
+            wanted += self.continua()
+        except TimeOverError:
+            self._outcome.late = True
+        return wanted
+
+    def _leave_but(self, codes: Codes, wanted: Sequence[Codes]) -> None:
+        splitting, stack = self._search.splitting, [(codes, wanted)]
+        while stack:
+            codes, wanted = stack.pop()
+            wanted = [final for final in wanted if all(map(splitting.holds, codes, final))]
+            if not wanted:
+                self._skip(codes)
+                continue
+            node = next((i for i, code in enumerate(codes) if code != wanted[0][i]), -1)
+            if node < 0:
+                try:
+                    self._search.settled(TreeNode(None, codes, -1, last=False, weight=0.0))
+                except TimeOverError:
+                    self._outcome.late = True
+                    self._skip(codes)
+                continue
+            final, before, after = wanted[0][node], codes[:node], codes[node + 1 :]
+            # the one that holds the selection comes last: what is beside it is left behind at once
+            children = splitting.towards(codes, node, final)
+            children.sort(key=partial(splitting.holds, final=final))
+            self._certifier.branching(node, children)
+            stack += [((*before, code, *after), wanted) for code in reversed(children)]
+
+    def _skip(self, codes: Codes) -> None:
+        stop = self._outcome.stopped
+        assert stop is not None
+        self._certifier.skipped(codes, str(stop))
+        hint = f"{stop.remedy}, or {self.otherwise}" if stop.limited and self.otherwise else stop.remedy
+        self._outcome.undecided.append(UndecidedPart(codes, "the search was stopped before it got here", hint))
+
+
 #: Progress is reported and limits on time are looked at after this many nodes.
-_REPORT_EVERY = 64
+REPORT_EVERY = 64
 #: Number of contact nodes from which a root is sought before the tree: of fewer the tree finds one sooner.
 _MANY = 24
-#: Nodes at the limit of what contact can hold, if no other number of them is given: blocks in 2D with 21 contact
-#: nodes take some 1,600, and in 3D with 4 some 1,000; others had not come to an end after 18,000 and 8,000. In 3D an
-#: eighth of it, some seconds.
-_AT_LIMIT = 2000
 
 
 def depth_first(waiting: list[Any], examine: Callable[[Any], Sequence[Any]], ended: Callable[[], bool]) -> None:
@@ -90,9 +188,9 @@ class TreeSearch:
         self.closer.relaxed = relaxations.energy
         self._recorder = certifier.recorder
         self.outcome = SearchOutcome()
-        self.rest = Remainder(certifier, self.splitting, self.outcome, self._settle_late, known_root)
-        #: The limit of what contact can hold, if the load is there: what stays undecided is what rounding decides.
-        self.at_limit: LoadLimit | None = None
+        self.rest = Remainder(self, known_root)
+        #: Most nodes where the load is at the limit of what contact can hold: what stays undecided, rounding decides.
+        self.at_limit: int | None = None
         self.covered = 0.0
         #: Examines what waits, the last first, until it is time to stop, and gives what still waits then; another one
         #: than this spreads it over workers.
@@ -252,12 +350,8 @@ class TreeSearch:
 
     def finish(self) -> None:
         """Leave what was skipped undecided, except for the known root and the selections of continua in it."""
-        with within(Deadline(self.limits.deadline).extended(self._start)):
+        with within(self.limits.extended(self._start)):
             self.rest.finish()
-
-    def _settle_late(self, codes: Codes) -> None:
-        """Have the certifier decide a complete selection after the search was stopped."""
-        self._settle(TreeNode(None, codes, -1, last=False, weight=0.0))
 
     def examine(self, item: TreeNode) -> list[TreeNode]:
         """Settle one node of the tree, or give its children, the one that is examined first last."""
@@ -361,21 +455,15 @@ class TreeSearch:
             outcome.stopped = Stop(StopReason.NODE_LIMIT, limits.max_nodes, unexamined=waiting)
         elif limits.enough is not None and limits.enough(outcome.solutions):
             outcome.stopped = Stop(StopReason.ENOUGH_ROOTS, unexamined=waiting)
-        elif self._rounding_decides():
+        elif self.at_limit is not None and (
+            outcome.undecided or (limits.max_nodes is None and outcome.nodes >= self.at_limit)
+        ):
             outcome.stopped = Stop(StopReason.AT_LIMIT, outcome.nodes, unexamined=waiting)
         elif limits.over:
             outcome.stopped = Stop(StopReason.TIME_LIMIT, unexamined=waiting)
-        elif outcome.nodes % _REPORT_EVERY == 0:
+        elif outcome.nodes % REPORT_EVERY == 0:
             self.report()
         return outcome.stopped is not None
-
-    def _rounding_decides(self) -> bool:
-        """True if a load at the limit leaves no hope of a complete search."""
-        if self.at_limit is None:
-            return False
-        # in 3D no family is known, and nodes cost more
-        most = _AT_LIMIT if self.at_limit.codes is not None else _AT_LIMIT // 8
-        return bool(self.outcome.undecided) or (self.limits.max_nodes is None and self.outcome.nodes >= most)
 
     def report(self, share: float = 0.0) -> None:
         """Tell that so much more of the tree is done, and how many nodes were examined."""

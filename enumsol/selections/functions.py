@@ -65,7 +65,7 @@ class SelectionFunctions:
     def _matrix(self, alpha: int) -> tuple[Any, Any]:
         """Integer matrix and right-hand side of the reduced system at an integer alpha, columns times dF."""
         data, rows = self.exact.integers, self._selection.unknown
-        S = as_objects([data.S[r] for r in rows])
+        S = as_objects([data.rows[r] for r in rows])
         F = as_objects([a + alpha * b for a, b in zip(data.F0, data.F1, strict=True)])
         unit = data.friction_unit
         return self._selection.columns(S, F, unit).tolist(), [[data.g0[r] + alpha * data.g1[r]] for r in rows]
@@ -125,7 +125,7 @@ class SelectionFunctions:
 
     @cached_property
     def _forces(self) -> list[Any]:
-        """Numerators of lambda in units of ``_Integers.force`` (a slipping node's unknown is lambda_n / dF)."""
+        """Numerators of lambda in units of ``integers.force`` (a slipping node's unknown is lambda_n / dF)."""
         data = self.exact.integers
         F = as_objects([fmpz_poly([a, b]) for a, b in zip(data.F0, data.F1, strict=True)])
         unknowns = as_objects(self.numerators)
@@ -143,7 +143,7 @@ class SelectionFunctions:
     def _displacement(self, row: int) -> Any:
         data = self.exact.integers
         total = self.det * fmpz_poly([data.g0[row], data.g1[row]])
-        for s, force in zip(data.S[row], self._forces, strict=True):
+        for s, force in zip(data.rows[row], self._forces, strict=True):
             if not force.is_zero():
                 total -= force * s
         return total

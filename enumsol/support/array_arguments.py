@@ -263,9 +263,26 @@ def vector_of(value: object, name: str, size: int) -> Floats:
     InvalidArgumentError
         It is not that.
     """
-    array = real_array(value, name, error=InvalidArgumentError)
-    if array.shape != (size,):
-        raise InvalidArgumentError(f"{name} has shape {array.shape}; expected ({size},)")
+    return array_of(value, name, (size,))
+
+
+def array_of(
+    value: object,
+    name: str,
+    shape: tuple[int, ...],
+    expected: str = "",
+    error: type[EnumsolError] = InvalidArgumentError,
+) -> Floats:
+    """Value as a finite array of a shape, in words what is ``expected``.
+
+    Raises
+    ------
+    EnumsolError
+        It is not that: an error of this type.
+    """
+    array = real_array(value, name, error=error)
+    if array.shape != shape:
+        raise error(f"{name} has shape {array.shape}; expected {expected or shape}")
     return array
 
 

@@ -13,7 +13,7 @@ from concurrent.futures import Future, wait
 from contextlib import contextmanager
 from contextvars import ContextVar, copy_context
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Protocol, TypeVar
+from typing import TYPE_CHECKING, TypeVar
 
 from enumsol.errors import Interrupted, OutOfMemoryError
 
@@ -31,12 +31,6 @@ class TimeOverError(Exception):
     """The time is over; whoever set the limit catches this and keeps what was found."""
 
 
-class Limited(Protocol):
-    """Has a deadline, a value of time.perf_counter(), or None."""
-
-    deadline: float | None
-
-
 @dataclass
 class Deadline:
     """A deadline of its own.
@@ -47,6 +41,15 @@ class Deadline:
     """
 
     deadline: float | None = None
+
+    @property
+    def over(self) -> bool:
+        """True if the deadline has passed."""
+        return self.deadline is not None and time.perf_counter() > self.deadline
+
+    def remaining(self) -> float | None:
+        """Seconds until the deadline."""
+        return None if self.deadline is None else self.deadline - time.perf_counter()
 
     @classmethod
     def after(cls, started: float, limit: float | None) -> Deadline:
@@ -66,11 +69,11 @@ class Deadline:
         return self if self.deadline is None else Deadline(now + share * (self.deadline - now))
 
 
-_current: ContextVar[Limited | None] = ContextVar("deadline", default=None)
+_current: ContextVar[Deadline | None] = ContextVar("deadline", default=None)
 
 
 @contextmanager
-def within(limits: Limited) -> Iterator[None]:
+def within(limits: Deadline) -> Iterator[None]:
     """Inside, `look` raises once the deadline of these limits has passed; other limits do not count there."""
     token = _current.set(limits)
     try:
@@ -87,14 +90,14 @@ def current() -> float | None:
 
 def remaining() -> float | None:
     """The seconds that are left here."""
-    deadline = current()
-    return None if deadline is None else deadline - time.perf_counter()
+    limits = _current.get()
+    return None if limits is None else limits.remaining()
 
 
 def over() -> bool:
     """True if the time is over."""
-    deadline = current()
-    return deadline is not None and time.perf_counter() > deadline
+    limits = _current.get()
+    return limits is not None and limits.over
 
 
 def look() -> None:

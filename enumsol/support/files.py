@@ -13,6 +13,7 @@ import zipfile
 import zlib
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
+from enum import Enum
 from pathlib import Path
 from typing import Any
 
@@ -191,11 +192,18 @@ def reading(place: Path, content: str, writer: str) -> Iterator[None]:
         ) from error
 
 
+def plain_value(value: object) -> Any:
+    """Lists of arrays, values of enumerations and texts of fractions, which JSON does not have."""
+    if hasattr(value, "tolist"):  # arrays of numpy, which is not imported for --help
+        return value.tolist()
+    return value.value if isinstance(value, Enum) else str(value)
+
+
 def write_arrays(place: Path, version: int, report: Mapping[str, Any], arrays: Mapping[str, Any]) -> None:
     """Write arrays, and a report that JSON can hold, to a .npz file (errors as of ``writing``)."""
     import numpy as np  # what writes other files does without
 
-    meta = np.array(json.dumps({"format": version, **report}))
+    meta = np.array(json.dumps({"format": version, **report}, default=plain_value))
     packed = io.BytesIO()
     np.savez_compressed(packed, allow_pickle=False, meta=meta, **arrays)
     write_file(place, packed.getvalue(), "path")

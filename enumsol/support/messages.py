@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import enum
 import unicodedata
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator, Sequence
+from contextlib import contextmanager
 from html import escape
 
 #: Categories of characters that control a terminal (also the direction of writing), or that have no picture.
@@ -44,6 +45,25 @@ def listed(names: Iterable[object], suffix: str = "") -> str:
     if len(texts) > 14:
         texts = [*texts[:12], f"{len(texts) - 12} more"]
     return " and ".join([", ".join(texts[:-1]), texts[-1]] if len(texts) > 1 else texts)
+
+
+def aligned(rows: Sequence[Sequence[str]], left: int = 1, *, free: bool = False) -> list[str]:
+    """Lines of a table: columns to the left, then others to the right; the last one is ``free`` if it is any text."""
+    widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
+    lines = []
+    for row in rows:
+        cells = [f"{c:<{w}}" if k < left else f"{c:>{w}}" for k, (c, w) in enumerate(zip(row, widths, strict=True))]
+        lines.append("  ".join([*cells[:-1], row[-1]] if free else cells))
+    return lines
+
+
+@contextmanager
+def about(what: object, *kinds: type[Exception], made: type[Exception] | None = None) -> Iterator[None]:
+    """A block whose errors of some kinds get what they are about before them, and become ``made`` if that is given."""
+    try:
+        yield
+    except kinds as error:
+        raise (made or type(error))(f"{what}: {error}") from error
 
 
 def html_lines(lines: Iterable[str]) -> str:

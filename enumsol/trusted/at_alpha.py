@@ -27,7 +27,7 @@ from enumsol.arithmetic.balls import (
     upper_norm,
     verified_solve,
 )
-from enumsol.trusted.selection import Selection, row_values
+from enumsol.trusted.selection import Numbers, Selection, row_values
 from enumsol.trusted.status_rows import CONDITIONS, SLIP_MINUS, SLIP_PLUS, STICK
 
 if TYPE_CHECKING:
@@ -92,10 +92,20 @@ class _Solved(NamedTuple):
     w: Ball
 
 
+@np.errstate(over="ignore", invalid="ignore")
 def solve_selection(system: EnclosedSystem, codes: Sequence[int]) -> VerifiedSelection | None:
     """The verified solution of a complete selection, or None when its matrix is not proven regular."""
-    with np.errstate(over="ignore", invalid="ignore"):
-        return _solve_selection(system, codes)
+    selection = Selection(codes, len(system.reach))
+    if not len(selection.unknown):
+        return _conditions(system, codes, Ball.exact(np.zeros(2 * system.p)), system.balls[1], 1)
+    solved = _solved(system, selection)
+    if solved is None:
+        return None
+    equations, _, force, w = solved
+    found = _conditions(system, codes, force, w, equations.sign)
+    if found.is_root or found.is_excluded:
+        return found
+    return _conditions(system, codes, force, _closer(system, selection, solved), equations.sign)
 
 
 @dataclass(frozen=True)
@@ -117,17 +127,12 @@ def settled_selection(
     """
     ball = solve_selection(system, codes)
     if ball is None or not ball.is_root:
-        if holds_no_root(system, codes, ball):
+        if (ball is not None and ball.is_excluded) or contradicts(system, codes):
             return None
         ball = precisely(codes) or ball
         if ball is not None and ball.is_excluded:
             return None
     return ball if ball is not None and ball.is_root else Unsettled(ball)
-
-
-def holds_no_root(system: EnclosedSystem, codes: Sequence[int], ball: VerifiedSelection | None) -> bool:
-    """True if a complete selection is proven to hold no root; ``ball`` is its verified solution, if it has one."""
-    return (ball is not None and ball.is_excluded) or contradicts(system, codes)
 
 
 def contradicts(system: EnclosedSystem, codes: Sequence[int]) -> bool:
@@ -156,20 +161,6 @@ def contradicts(system: EnclosedSystem, codes: Sequence[int]) -> bool:
         least = abs(float(y @ b.mid)) - float(y_abs @ (b.rad + k * np.abs(b.mid))) * (1 + 2 * k) * SAFE - TINY
         product = np.abs(y @ M.mid) + y_abs @ (M.rad + k * np.abs(M.mid)) * (1 + 2 * k) * SAFE
         return bool(least > upper_norm(product) * system.largest_unknowns * SAFE + ROOT_TINY)
-
-
-def _solve_selection(system: EnclosedSystem, codes: Sequence[int]) -> VerifiedSelection | None:
-    selection = Selection(codes, len(system.reach))
-    if not len(selection.unknown):
-        return _conditions(system, codes, Ball.exact(np.zeros(2 * system.p)), system.balls[1], 1)
-    solved = _solved(system, selection)
-    if solved is None:
-        return None
-    equations, _, force, w = solved
-    found = _conditions(system, codes, force, w, equations.sign)
-    if found.is_root or found.is_excluded:
-        return found
-    return _conditions(system, codes, force, _closer(system, selection, solved), equations.sign)
 
 
 def displacements(system: EnclosedSystem, codes: Sequence[int]) -> Ball | None:
@@ -225,8 +216,7 @@ def _closer(system: EnclosedSystem, selection: Selection, found: _Solved) -> Bal
 
 
 def _conditions(system: EnclosedSystem, codes: Sequence[int], force: Ball, w: Ball, sign: int) -> VerifiedSelection:
-    kinds, nodes = np.array([(kind, i) for i, code in enumerate(codes) for kind in CONDITIONS[code][1]]).T
-    slack = row_values(force, w, system.balls[2])[kinds, nodes]
+    slack = conditions_of(codes, force, w, system.balls[2])
     if not len(system.reach):
         return VerifiedSelection(force, w, slack, sign)
     # the unknowns beyond the contact forces are -q, by which the columns of the border change sign
@@ -236,6 +226,13 @@ def _conditions(system: EnclosedSystem, codes: Sequence[int], force: Ball, w: Ba
         slack = Ball.joined(slack, reach - rigid, reach + rigid)
     sign = -sign if len(system.reach) % 2 else sign
     return VerifiedSelection(force[:contact], w[:contact], slack, sign, rigid)
+
+
+def conditions_of(codes: Sequence[int], force: Numbers, w: Numbers, F: Numbers) -> Numbers:
+    """Values of the inequalities of a complete selection, node by node, as balls or numbers of any kind."""
+    kinds, nodes = np.array([(kind, i) for i, code in enumerate(codes) for kind in CONDITIONS[code][1]]).T
+    values: Numbers = row_values(force, w, F)[kinds, nodes]
+    return values
 
 
 #: Nodes between stick and slip at most: there are twice as many selections for each.

@@ -9,7 +9,7 @@ and, for any x, q'S^{-1}q = 2 x'q - x'S x + r'S^{-1}r with r = q - S x. For anot
     min q  >=  k + y'g - 1/4 v'H^{-1}v
 
 and, for any x, v'H^{-1}v = 2 x'v - x'H x + r'H^{-1}r with r = v - H x. Over an interval of alpha the bound is concave
-in alpha (see ``trusted.over_interval``). ``trusted.energy_bounds`` has the bounds themselves.
+in alpha (see ``trusted.over_interval``). ``trusted.quadratic_forms`` has the bounds themselves.
 """
 
 from __future__ import annotations
@@ -21,10 +21,9 @@ import numpy as np
 
 from enumsol.arithmetic.balls import SAFE, gamma
 from enumsol.condensation.enclosure import EnclosedSystem
-from enumsol.trusted.energy_bounds import energy_bounds, form_bounds
 from enumsol.trusted.floating_bounds import floating_bounds
 from enumsol.trusted.over_interval import EnclosedPiece
-from enumsol.trusted.quadratic_forms import EnclosedForm
+from enumsol.trusted.quadratic_forms import EnclosedForm, energy_bounds, form_bounds
 from enumsol.trusted.status_rows import FORBIDDEN, NONNEGATIVE, ROW_KINDS, row_signs
 
 if TYPE_CHECKING:

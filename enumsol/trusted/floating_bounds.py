@@ -4,7 +4,7 @@ With multipliers y on S lambda - g - G'q and c on lambda, and any z on G lambda 
 
     min e - h'q  >=  B(y, c + G'z) + z'h + min (G y - h)'q
 
-where B is the bound of the body on springs (``trusted.energy_bounds``). The last term vanishes if G y = h, and is at
+where B is the bound of the body on springs (``energy_bounds``). The last term vanishes if G y = h, and is at
 least -reach'|G y - h| otherwise. Where no forces are in balance with the load, no energy is asked for.
 
 Far away the body moves as if it were rigid (theory, section 14.4): w is G'q but for an elastic part that is bounded,
@@ -21,7 +21,7 @@ import numpy as np
 from enumsol.arithmetic.balls import SAFE, TINY, UNIT, Ball, gamma, upper_norm
 from enumsol.condensation.enclosure import NotEnclosedError
 from enumsol.support.deadlines import look
-from enumsol.trusted.energy_bounds import dots, energy_bounds
+from enumsol.trusted.quadratic_forms import dots, energy_bounds
 from enumsol.trusted.status_rows import BACKWARD, FORWARD, FRICTIONLESS, OPEN, SLIP_MINUS, SLIP_PLUS, UNDECIDED
 
 if TYPE_CHECKING:
@@ -148,20 +148,9 @@ def is_unbalanced(system: EnclosedSystem, codes: Sequence[int], z: Floats) -> bo
     z'h > 0, and z'G lambda <= 0 for the forces that span those of every node: (1, F) or (1, -F), or (1, 0) where F = 0.
     """
     with np.errstate(over="ignore", invalid="ignore"):
-        (G, h), p, k = (system.rows.G, system.rows.h), system.p, gamma(len(z) + 8)
-        z_abs = np.abs(z)
-        load = float(z @ h.mid - (z_abs @ (h.rad + k * np.abs(h.mid))) * (1 + k) * SAFE - TINY)
-        work = z @ G.mid
-        size = z_abs @ (np.abs(G.mid) + G.rad)
-        slack = (z_abs @ G.rad + k * size) * (1 + k) * SAFE
-        normal, across, F = work[:p], work[p:], system.F
-        # F is below zero where it vanishes at an end of an interval that is rounded outward
-        spread = slack[:p] + (np.abs(F) + system.F_rad) * slack[p:] + system.F_rad * np.abs(across)
-        spread += k * (np.abs(normal) + np.abs(F * across))
-        # what underflows is less, and nothing of it is left where all is zero
-        spread = np.where(size[:p] + size[p:] > 0, spread * (1 + k) * SAFE + TINY, 0.0)
-        most = np.stack([normal, normal + F * across, normal - F * across]) + spread
-    given = np.array(codes)
+        (load, off), normal, turned, spread = _work(system, z)
+        most = np.stack([normal, normal + turned, normal - turned]) + spread
+    given, F = np.array(codes), system.F
     contact = given != OPEN
     without = contact & (F == 0)
     with_friction = contact & (F != 0)
@@ -172,7 +161,26 @@ def is_unbalanced(system: EnclosedSystem, codes: Sequence[int], z: Floats) -> bo
             with_friction & (given != SLIP_PLUS) & (given != FORWARD),
         ]
     )
-    return load > 0 and bool(np.all(most[rays] <= 0))
+    return load - off > 0 and bool(np.all(most[rays] <= 0))
+
+
+def _work(system: EnclosedSystem, z: Floats) -> tuple[tuple[float, float], Floats, Floats, Floats]:
+    """Work z'h of the load on a motion and a bound of its error; of every node that of (1, 0) and of (0, F), errors.
+
+    The last, (p,), bounds the errors of sums and differences of both.
+    """
+    (G, h), p, k = (system.rows.G, system.rows.h), system.p, gamma(len(z) + 8)
+    z_abs, work, F = np.abs(z), z @ G.mid, system.F
+    off = float(z_abs @ (h.rad + k * np.abs(h.mid))) * (1 + k) * SAFE * SAFE + TINY
+    size = z_abs @ (np.abs(G.mid) + G.rad)
+    slack = (z_abs @ G.rad + k * size) * (1 + k) * SAFE
+    normal, turned = work[:p], F * work[p:]
+    # F is below zero where it vanishes at an end of an interval that is rounded outward
+    spread = slack[:p] + (np.abs(F) + system.F_rad) * slack[p:] + system.F_rad * np.abs(work[p:])
+    spread += k * (np.abs(normal) + np.abs(turned))
+    # what underflows is less, and nothing of it is left where all is zero
+    spread = np.where(size[:p] + size[p:] > 0, spread * (1 + k) * SAFE + TINY, 0.0)
+    return (float(z @ h.mid), off), normal, turned, spread
 
 
 def _weighted(G: Floats, weights: Floats) -> Floats:
@@ -298,7 +306,6 @@ class _Cells:
     def _largest_forces(self) -> Floats | None:
         """Bounds of lambda_n, (p,), by a motion that all contact forces oppose; None without one."""
         system, p = self._system, self._p
-        G, h, k = system.rows.G, system.rows.h, gamma(len(self._reach) + 8)
         rays = np.array(_rays(system, (UNDECIDED,) * p))
         size = np.linalg.norm(rays, axis=1)
         if not np.all(size > 0):
@@ -311,18 +318,9 @@ class _Cells:
         found = linprog(np.r_[np.zeros(r), -1.0], rows, np.zeros(len(rays)), bounds=limits)
         if found.status != 0:
             return None
-        z = found.x[:r]
-        z_abs, F = np.abs(z), system.F
-        work = z @ G.mid
-        slack = (z_abs @ G.rad + k * (z_abs @ np.abs(G.mid))) * (1 + k) * SAFE
-        across = F * np.abs(work[p:])
-        spread = slack[:p] + (F + system.F_rad) * slack[p:] + system.F_rad * np.abs(work[p:])
-        spread += k * (np.abs(work[:p]) + across)
-        least = work[:p] - across - spread * (1 + k) * SAFE - TINY
-        load = float(z @ h.mid + z_abs @ (h.rad + k * np.abs(h.mid)) * (1 + k) * SAFE + TINY)
-        if not np.all(least > 0):
-            return None
-        return np.asarray(max(load, 0.0) / least * SAFE)
+        (load, off), normal, turned, spread = _work(system, found.x[:r])
+        least = normal - np.abs(turned) - spread
+        return np.asarray(max(load + off, 0.0) / least * SAFE) if np.all(least > 0) else None
 
     def all_excluded(self) -> bool:
         """True if every cell is shown to hold no solution."""

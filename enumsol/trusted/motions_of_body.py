@@ -15,12 +15,12 @@ import numpy as np
 import scipy.sparse as sp
 from scipy.sparse.csgraph import connected_components
 
-from enumsol.arithmetic.balls import SAFE, TINY, UNIT, Ball, hull
+from enumsol.arithmetic.balls import SAFE, TINY, UNIT, Ball, hull, nearest
 from enumsol.condensation.data import exactly_at
 from enumsol.condensation.dynamic import DynamicStiffness
-from enumsol.condensation.enclosure import NotEnclosedError, nearest_floats
+from enumsol.condensation.enclosure import NotEnclosedError, coefficients
 from enumsol.errors import InvalidArgumentError
-from enumsol.model.mass import checked_mass
+from enumsol.model.mesh import checked_mass
 from enumsol.support.arguments import alpha_value
 from enumsol.trusted.running_away import Motions, Touching
 from enumsol.trusted.status_rows import OPEN, SLIP_PLUS, STICK
@@ -183,7 +183,7 @@ class BodyMotions:
         return Setting(self._stiffness_of(part, dofs, rows), motions, dofs, rows, list(moves), unloaded)
 
     def _limit(self, held: Collection[int], F: list[Ball], i: int, directions: Ball | None) -> tuple[list[Ball], Ball]:
-        """Tangential move of a node at its limit, by axis, and by how much T_i sinks meanwhile (theory, (15.3))."""
+        """Tangential move of a node at its limit, by axis, and by how much T_i sinks meanwhile (theory, (15.4))."""
         if len(F) == 1:
             sign = 1.0 if SLIP_PLUS in held else -1.0
             return [Ball.exact(np.array(sign))], F[0][i]
@@ -203,9 +203,7 @@ class BodyMotions:
         if above * other != below * rate:
             return F[larger][i] * reciprocal(F[k][i])
         # for all alpha
-        exact = above / below if below else rate / other
-        value = float(exact)
-        return Ball(np.array(value), np.array(0.0 if Fraction(value) == exact else 2 * UNIT * abs(value) + TINY))
+        return nearest([above / below if below else rate / other])[0]
 
     def _stiffness_of(self, part: int, dofs: Integers, rows: list[int]) -> DynamicStiffness:
         """Stiffness of some rows of a part."""
@@ -232,11 +230,8 @@ def friction_over(problem: AnyProblem, low: AlphaLike, high: AlphaLike) -> list[
     first, slope = (np.asarray(part).reshape(problem.p, -1) for part in problem.affine_friction)
     balls = []
     for k in range(first.shape[1]):
-        ends = []
-        for alpha in (low, high):
-            F, inexact = nearest_floats(exactly_at(Fraction(alpha_value(alpha)), first[:, k], slope[:, k]))
-            ends.append(Ball(F, np.where(inexact, 2 * UNIT * F + TINY, 0.0)))
-        balls.append(hull(ends))
+        ends = [exactly_at(Fraction(alpha_value(alpha)), first[:, k], slope[:, k]) for alpha in (low, high)]
+        balls.append(hull([coefficients(end) for end in ends]))
     return balls
 
 

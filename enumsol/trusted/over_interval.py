@@ -30,6 +30,8 @@ if TYPE_CHECKING:
 
 
 KINDS = ROW_KINDS + 2
+#: Of theta along an arc.
+_MOST_DEGREE = 32
 #: Table of rows.row_table with kinds 7 and 8; then slip+ and slip- at a node whose friction varies.
 _CONSTANT = np.hstack([row_table(), np.zeros((len(row_table()), 2), dtype=np.int8)])
 _VARYING = _CONSTANT.copy()
@@ -151,11 +153,23 @@ class PieceNumbers:
     share: float = 0.0
     degree: int = 1
 
-    @property
-    def usable(self) -> bool:
-        """True if they are numbers, and positive where they must be."""
-        finite = all(np.all(np.isfinite(part)) for part in (self.mu, self.kappa, self.nu, self.balance, self.share))
-        return bool(finite and np.all(self.mu > 0) and np.all(self.kappa > 0) and self.balance >= 0)
+    @classmethod
+    def of(cls, numbers: Floats, more: Floats) -> PieceNumbers:
+        """Numbers from those of a record: mu, kappa and nu one after the other, then none, or balance, share, degree.
+
+        Raises
+        ------
+        ValueError
+            One is not allowed.
+        """
+        (mu, kappa, nu), (balance, share, degree) = numbers.reshape(3, -1), more.tolist() or (0.0, 0.0, 1.0)
+        found = cls(mu, kappa, nu, balance, share, int(degree))
+        if degree not in range(1, _MOST_DEGREE + 1):
+            raise ValueError(f"the degree of theta is not among 1 to {_MOST_DEGREE}")
+        finite = np.all(np.isfinite(numbers)) and np.all(np.isfinite(more))
+        if not (finite and np.all(found.mu > 0) and np.all(found.kappa > 0) and balance >= 0):
+            raise ValueError("a number mu or kappa is not positive, or the factor of the balance negative")
+        return found
 
     def serve(self, largest: Floats) -> bool:
         """True if ``|nu| F <= mu`` for all coefficients up to these."""

@@ -110,8 +110,12 @@ def tangential_positions(
         selections = [codes] if codes is not None else product(*among) if among is not None else ()
         found = _by_selections(problem, alpha, selections, before)
     elif codes is not None and not well_known:
-        plane = len(moved.mid) == p
-        found = _by_many_digits(problem, alpha, codes, before) if plane else _by_leaf(problem, alpha, forces, codes)
+        if len(moved.mid) == p:
+            found = _by_many_digits(problem, alpha, codes, before)
+        else:
+            from enumsol.trusted.space.leaf_positions import leaf_positions  # in 3D only
+
+            found = leaf_positions(problem, alpha, forces, codes)
     moved = moved if found is None else smaller(found, moved)
     return Ball(np.where(still, before.mid, moved.mid), np.where(still, before.rad, moved.rad))
 
@@ -140,16 +144,9 @@ def _by_selections(problem: Any, alpha: Fraction, selections: Iterable[Sequence[
     return hull(found) if found else None
 
 
-def _by_leaf(problem: Any, alpha: Fraction, forces: Ball, codes: Sequence[int]) -> Ball | None:
-    from enumsol.trusted.space.leaf_positions import leaf_positions
-
-    return leaf_positions(problem, alpha, forces, codes)
-
-
 def _by_many_digits(problem: ContactProblem, alpha: Fraction, codes: Sequence[int], before: Ball) -> Ball | None:
     """Positions of all nodes at the regular root of a selection; None where many digits do not enclose it."""
-    from enumsol.trusted.arcs.many_digits import affordable
-    from enumsol.trusted.arcs.precise import PreciseSelection, PreciseSystem
+    from enumsol.trusted.arcs.precise import PreciseSelection, system_in_many_digits
 
-    system = PreciseSystem.of(problem) if affordable(problem) else None
+    system = system_in_many_digits(problem)
     return None if system is None else PreciseSelection(system, codes).positions(alpha, before)

@@ -20,13 +20,12 @@ import scipy.sparse as sp
 from enumsol.arithmetic.balls import (
     SAFE,
     TINY,
-    UNIT,
     Ball,
-    dense_eigenvalue_bound,
     determinant_sign,
     gamma,
+    least_eigenvalue,
+    nearest,
     solution,
-    upper_norm,
 )
 from enumsol.trusted.status_rows import OPEN, SLIP_MINUS, SLIP_PLUS, STICK
 
@@ -76,7 +75,7 @@ class Touching:
 
 @dataclass(frozen=True, eq=False)
 class Motions:
-    """Directions in which contact rows may begin to move at an equilibrium, k of them (theory, (15.3)).
+    """Directions in which contact rows may begin to move at an equilibrium, k of them (theory, (15.4)).
 
     Attributes
     ----------
@@ -137,13 +136,10 @@ class NoMotion:
     weights: Floats
     products: tuple[Floats, Floats]
 
+    # what overflows is not finite, and proves nothing
+    @np.errstate(all="ignore")
     def holds(self, stiffness: DynamicStiffness, motions: Motions) -> bool:
         """True if it is proven that nothing grows in the range."""
-        # what overflows is not finite, and proves nothing
-        with np.errstate(all="ignore"):
-            return self._holds(stiffness, motions)
-
-    def _holds(self, stiffness: DynamicStiffness, motions: Motions) -> bool:
         if not 0 <= self.low < self.high or not self._admitted(motions):
             return False
         kept = np.setdiff1d(np.arange(len(motions.signed)), self.stays)
@@ -209,7 +205,7 @@ class NoMotion:
         if np.isinf(high):
             slope = None
             if other is not None and beside is not None:
-                slope = (K - other) * _ratio(1, Fraction(low) - Fraction(beside))
+                slope = (K - other) * nearest([1 / (Fraction(low) - Fraction(beside))])[0]
             yield from self._without_end(stiffness, K, slope)
             return
         end = stiffness.at(high)
@@ -218,12 +214,12 @@ class NoMotion:
         if other is None or beside is None:
             if stiffness.increases:
                 yield (K, end - K), (end, None)
-        elif beside < low:
-            above = K + (K - other) * _ratio(Fraction(high) - Fraction(low), Fraction(low) - Fraction(beside)) - end
-            yield (K, None), (end, above)
+            return
+        first, length = Fraction(low), Fraction(high) - Fraction(low)
+        if beside < low:
+            yield (K, None), (end, K + (K - other) * nearest([length / (first - Fraction(beside))])[0] - end)
         else:
-            above = end - (other - end) * _ratio(Fraction(high) - Fraction(low), Fraction(beside) - Fraction(high)) - K
-            yield (K, above), (end, None)
+            yield (K, end - (other - end) * nearest([length / (Fraction(beside) - first - length)])[0] - K), (end, None)
 
     @staticmethod
     def _without_end(stiffness: DynamicStiffness, K: Ball, slope: Ball | None) -> Iterator[tuple[_End, _End]]:
@@ -324,34 +320,19 @@ def rates_in(
     x = Ball.exact(np.zeros(len(motions.signed)))
     if own:
         # left'(held - K R x) = more
-        goal = left.T @ Ball(held.mid[:, None], held.rad[:, None])
+        goal = left.T @ held[:, None]
         slid = list(way.slides)
         if more is not None and slid:
-            goal[: len(slid)] = goal[: len(slid)] - Ball(more.mid[slid][:, None], more.rad[slid][:, None])
+            goal[: len(slid)] = goal[: len(slid)] - more[slid][:, None]
         moved = solution(_across(left, K, motions.moves[:, own]), goal)
         if moved is None:
             return None, held
         x[own] = moved[:, 0]
-    y = held - (K @ (motions.moves @ Ball(x.mid[:, None], x.rad[:, None])))[:, 0]
-    signs = way.signs(motions, x, -Ball(y.mid[:, None], y.rad[:, None]), more)
+    y = held - (K @ (motions.moves @ x[:, None]))[:, 0]
+    signs = way.signs(motions, x, -y[:, None], more)
     if np.any(signs.mid + signs.rad < 0):
         return False, y
     return (True if np.all(signs.mid - signs.rad > 0) else None), y
-
-
-@dataclass(frozen=True, eq=False)
-class Motion:
-    """A motion that grows, as it is enclosed.
-
-    Attributes
-    ----------
-    mu : pair of float
-        Bounds of the square of its growth rate.
-    x : Ball (k,)
-    """
-
-    mu: tuple[float, float]
-    x: Ball
 
 
 @dataclass(frozen=True, eq=False)
@@ -361,6 +342,7 @@ class Growing:
     Attributes
     ----------
     low, high : float
+        Bounds of the square of its growth rate.
     way : Behaviour
     """
 
@@ -368,12 +350,9 @@ class Growing:
     high: float
     way: Behaviour
 
-    def found(self, stiffness: Stiffness, motions: Motions) -> Motion | None:
-        """The motion, if it is proven to be there."""
-        with np.errstate(all="ignore"):
-            return self._found(stiffness, motions)
-
-    def _found(self, stiffness: Stiffness, motions: Motions) -> Motion | None:
+    @np.errstate(all="ignore")
+    def found(self, stiffness: Stiffness, motions: Motions) -> Ball | None:
+        """The motion x, (k,), if it is proven to be there."""
         k = len(motions.signed)
         slides, touching = self.way.slides, self.way.touching
         if motions.unsure or not 0 < self.low < self.high < np.inf or len(touching) != len(motions.touching):
@@ -396,7 +375,7 @@ class Growing:
         x = Ball.exact(np.zeros(k))
         x[own] = vector[:, 0]
         signs = self.way.signs(motions, x, K @ (right @ vector))
-        return Motion((self.low, self.high), x) if np.all(signs.mid - signs.rad > 0) else None
+        return x if np.all(signs.mid - signs.rad > 0) else None
 
 
 @dataclass(frozen=True, eq=False)
@@ -533,22 +512,13 @@ def _times(K: Ball, right: Ball) -> Ball:
     return Ball(np.asarray(K.mid @ middle), np.asarray(rad * (1.0 + k) * SAFE + TINY))
 
 
-def _ratio(above: Fraction | int, below: Fraction) -> Ball:
-    """A quotient of rationals as a ball that can multiply matrices; one that overflows is not finite."""
-    try:
-        value = float(above / below)
-    except OverflowError:
-        value = np.inf
-    return Ball(np.array(value), np.array(2 * UNIT * abs(value) + TINY))
-
-
 def positive(Q: Ball) -> bool:
     """True if all symmetric matrices in a ball are positive definite."""
     if not Q.finite or np.any(Q.mid.diagonal() <= 0):
         return False
     unit = np.ldexp(1.0, -np.round(0.5 * np.log2(Q.mid.diagonal())).astype(int))
     scale = unit[:, None] * unit
-    return dense_eigenvalue_bound(Q.mid * scale) > float(upper_norm(Q.rad * scale + TINY)) * (1 + 2.0**-40)
+    return least_eigenvalue(Ball(Q.mid * scale, Q.rad * scale * SAFE + TINY)) > 0
 
 
 def left_open(leaves: Sequence[NoMotion]) -> tuple[float, float] | None:

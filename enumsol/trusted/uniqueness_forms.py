@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Generic, Self, TypeVar
 
 import numpy as np
 
-from enumsol.arithmetic.balls import SAFE, TINY, UNIT, Ball, dense_eigenvalue_bound, upper_norm
+from enumsol.arithmetic.balls import SAFE, TINY, UNIT, Ball, least_eigenvalue, upper_norm
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -440,11 +440,6 @@ def _table(W: Ball, P: Ball, least: float) -> Ball | None:
 def _sizes(rows: Ball) -> Floats:
     """Upper bounds of the norms of rows; 0 where a row is."""
     return np.where(_used(rows), upper_norm(rows.size, axis=1), 0.0) if len(rows.mid) else np.zeros(0)
-
-
-def least_eigenvalue(M: Ball) -> float:
-    """Lower bound of the smallest eigenvalue of symmetric matrices; at most 0 where none positive is proven."""
-    return (dense_eigenvalue_bound(M.mid) - float(upper_norm(M.rad))) / SAFE if M.finite else 0.0
 
 
 def _lacks(M: Ball) -> float:

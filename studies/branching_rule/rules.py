@@ -19,8 +19,7 @@ import numpy as np
 
 from enumsol.model.statuses import CONTACT, OPEN, SLIP_MINUS, SLIP_PLUS, STICK, UNDECIDED
 from enumsol.relaxation.active_set import ActiveSetEngine
-from enumsol.relaxation.engine import BRANCHING_CANDIDATES, PRUNE_MARGIN
-from enumsol.relaxation.imposed_rows import status_rows
+from enumsol.relaxation.engine import BRANCHING_CANDIDATES, PRUNE_MARGIN, status_rows
 
 #: Part of the gap below which a child's gain makes no difference, and the weight of nodes with three children: those of
 #: the package's rule.

@@ -46,7 +46,7 @@ was tried on six clips (p = 17 to 25, friction 2 to 5), geometric means of nodes
 - the children of all candidates solved: 0.55 to 0.73 as many nodes, three to six times as many programs.
 
 Table ``lookahead``: verified searches that look ahead near their root once their tree has proven long
-(``enumsol/search/lookahead.py``), and the same that never do. Read the nodes, which include the first thousand. What
+(``enumsol/search/nodes.py``), and the same that never do. Read the nodes, which include the first thousand. What
 else was tried, nodes + programs of children (each costs about 0.4 nodes), without the first thousand nodes:
 
 - from the beginning: wedge 20 straight 1,098 -> 1,158 + 1,785, wedge 14 straight 578 -> 552 + 814, dovetail 143 -> 154
@@ -83,8 +83,8 @@ from branching_rule.rules import RULES
 from enumsol import gallery
 from enumsol.model.statuses import UNDECIDED
 from enumsol.relaxation.active_set import ActiveSetEngine
-from enumsol.relaxation.imposed_rows import status_rows
-from enumsol.search import lookahead
+from enumsol.relaxation.engine import status_rows
+from enumsol.search import nodes as tree_nodes
 from shared.clock import least_time
 from shared.loads import DRAGGED, PRESSED, Loaded, block, oblique_wedge, straight_wedge
 from shared.searches import search
@@ -223,8 +223,8 @@ def lookahead_row(loaded):
     problem = loaded.build()
     problem.condensed, problem.enclosure  # noqa: B018 (made once, outside the clock)
     line, found = {"problem": loaded.name, "p": loaded.p, "F": loaded.alpha}, set()
-    for name, nodes in (("without", 10**9), ("as it is", lookahead.NODES)):
-        with mock.patch.object(lookahead, "NODES", nodes):
+    for name, nodes in (("without", 10**9), ("as it is", tree_nodes.NODES)):
+        with mock.patch.object(tree_nodes, "NODES", nodes):
             start = time.process_time()
             roots = enumsol.enumerate_roots(problem, loaded.alpha)
             seconds = time.process_time() - start

@@ -23,7 +23,7 @@ from unittest.mock import patch
 
 import enumsol
 from contact_alone.bodies import brake_shoe, clip, half_plate, pin, stack, telescope, wedge
-from enumsol.search.closing import TreeCloser
+from enumsol.search.nodes import TreeCloser
 from shared.clock import timed
 from shared.results import yes
 

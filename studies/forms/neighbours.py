@@ -16,7 +16,7 @@ from scipy.linalg import LinAlgError, cho_factor, cho_solve, eigvalsh, solve_tri
 
 from enumsol.arithmetic.balls import factor_above
 from enumsol.model.statuses import RowKind
-from enumsol.relaxation.imposed_rows import EQUALITY, row_normals
+from enumsol.relaxation.engine import EQUALITY, row_normals
 
 #: Kinds of rows that are imposed as inequalities; the cones stand for lambda_n >= 0 where both are.
 KINDS = (

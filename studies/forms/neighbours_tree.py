@@ -12,7 +12,7 @@ import enumsol
 from enumsol import gallery
 from enumsol.model.statuses import CONTACT, UNDECIDED
 from enumsol.relaxation.active_set import ActiveSetEngine
-from enumsol.relaxation.imposed_rows import status_rows
+from enumsol.relaxation.engine import status_rows
 from enumsol.search.solvers import Solvers
 from enumsol.selections.float_selections import SIGN_TOLERANCE
 from forms.neighbours import NeighbourForms, by_clarabel

@@ -55,7 +55,7 @@ from contextlib import contextmanager
 from typing import TYPE_CHECKING
 
 import enumsol
-from enumsol.search import form_policy as policy
+from enumsol.search import nodes as policy
 from forms import neighbours_tree
 from shared.loads import DRAGGED, PRESSED, block, oblique_wedge, straight_wedge
 
@@ -117,7 +117,7 @@ def row(loaded):
     problem.enclosure  # noqa: B018 (made once, outside the clock)
     enumsol.enumerate_roots(problem, loaded.alpha, max_nodes=10)
     line = {"problem": loaded.name, "F": loaded.alpha}
-    ways = {", energy": {"NODES": NEVER}, ", from the beginning": {"NODES": EARLY}, "": {}}
+    ways = {", energy": {"FORM_AFTER": NEVER}, ", from the beginning": {"FORM_AFTER": EARLY}, "": {}}
     for way, constants in ways.items():
         nodes, seconds, size, check, line["roots"] = searched(problem, loaded, **constants)
         line |= {f"nodes{way}": nodes, f"seconds{way}": seconds, f"proof{way} [kB]": size, f"check{way} [s]": check}
@@ -129,7 +129,7 @@ def by_steps(loaded, choices):
     problem = loaded.build()
     problem.enclosure  # noqa: B018
     for steps in choices:
-        nodes, seconds, *_ = searched(problem, loaded, NODES=EARLY, STEPS=steps)
+        nodes, seconds, *_ = searched(problem, loaded, FORM_AFTER=EARLY, STEPS=steps)
         yield {"problem": loaded.name, "F": loaded.alpha, "steps": steps, "nodes": nodes, "seconds": seconds}
 
 

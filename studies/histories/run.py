@@ -98,7 +98,7 @@ def fretting(run: Run) -> None:
                 "work of 2nd half / 1st": (work[2] - work[1]) / (work[1] - work[0]),
                 "unique until": history.unique_until,
                 "complete": yes(history.complete),
-                "widest start": max(stage.largest_radius for stage in history.data.stages),
+                "widest start": max(stage.largest_radius for stage in history.all_stages),
                 "seconds": seconds,
             }
         )
@@ -181,7 +181,7 @@ def cost(run: Run) -> None:
     history = enumsol.histories(block, loads)
     together = time.perf_counter() - started
     started = time.perf_counter()
-    for stage, load in zip(history.data.stages, loads, strict=True):
+    for stage, load in zip(history.all_stages, loads, strict=True):
         given = block.arguments | {"f": load, "slip_offset": stage.start.offset}
         enumsol.enumerate_roots(enumsol.ContactProblem(**given), 0)
     apart = time.perf_counter() - started

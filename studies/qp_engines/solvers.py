@@ -12,8 +12,7 @@ from typing import NamedTuple
 import numpy as np
 
 from enumsol.relaxation.active_set import ActiveSetEngine
-from enumsol.relaxation.engine import PRUNE_MARGIN
-from enumsol.relaxation.imposed_rows import EQUALITY
+from enumsol.relaxation.engine import EQUALITY, PRUNE_MARGIN
 from enumsol.relaxation.interior_point import InteriorPointEngine
 
 INSTALLED = find_spec("daqp") is not None

@@ -17,8 +17,7 @@ from enumsol.relaxation.space_relaxation import SpaceEngine, SpaceRelaxation
 from enumsol.search.nodes import Relaxations
 from enumsol.search.outcome import SearchLimits
 from enumsol.search.space import space_search as space
-from enumsol.search.space.space_search import SpaceSplitting
-from enumsol.search.space.space_setup import SpaceSolvers
+from enumsol.search.space.space_search import SpaceSolvers, SpaceSplitting
 from enumsol.search.tree import TreeSearch
 from enumsol.trusted.space.leaves import Open, SpaceRoot, distinct_roots, settle
 
@@ -224,7 +223,7 @@ def early(run: Run, cases, max_nodes) -> None:
             for build, alpha in problems:
                 problem = build()
                 problem.enclosure  # noqa: B018 (made once, not part of the search)
-                taken, engine = Solvers(problem, alpha, values).searched(SearchLimits(None, max_nodes))
+                taken, engine = Solvers(problem, alpha, values).searched(SearchLimits(max_nodes=max_nodes))
                 results.append(taken)
                 branched += engine.branched
             totals = {key: sum(result[key] for result in results) for key in results[0]}

@@ -18,16 +18,14 @@ import scipy.linalg
 from enumsol import gallery
 from enumsol.model.sectors import SECTORS, direction, end_number, width_level
 from enumsol.model.statuses import CONTACT, OPEN, STICK, UNDECIDED
-from enumsol.relaxation.engine import FEASIBILITY_TOLERANCE, PRUNE_MARGIN
-from enumsol.relaxation.imposed_rows import EQUALITY
+from enumsol.relaxation.engine import EQUALITY, FEASIBILITY_TOLERANCE, PRUNE_MARGIN
 from enumsol.relaxation.space_relaxation import SpaceEngine, SpaceRelaxation, imposed
 from enumsol.search.certifiers.protocol import Unrecorded
 from enumsol.search.nodes import Relaxations
 from enumsol.search.outcome import SearchLimits
 from enumsol.search.space.space_fathoming import Point
 from enumsol.search.space.space_newton import Isotropic
-from enumsol.search.space.space_search import SpaceCertifier, SpaceSplitting
-from enumsol.search.space.space_setup import SpaceSolvers
+from enumsol.search.space.space_search import SpaceCertifier, SpaceSolvers, SpaceSplitting
 from enumsol.search.splitting import ImposedRows
 from enumsol.search.tree import TreeSearch
 from enumsol.trusted.space.leaves import distinct_roots
@@ -314,7 +312,7 @@ def forms(run: Run, most: int) -> None:
     ):
         solvers = Solvers(gallery.wedge3d(*cells, friction=F, multipliers="nodes"), 0.0, "verified")
         certifier = solvers.certifier()
-        search = solvers.search(certifier, SearchLimits(None, SMOKE_NODES if run.smoke else most))
+        search = solvers.search(certifier, SearchLimits(max_nodes=SMOKE_NODES if run.smoke else most))
         search.every = every
         started = process_time()
         outcome = search.run()

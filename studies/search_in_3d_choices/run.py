@@ -68,8 +68,7 @@ from enumsol.relaxation.engine import PRUNE_MARGIN
 from enumsol.relaxation.space_relaxation import SpaceEngine, SpaceRelaxation
 from enumsol.search.certifiers.protocol import Refine, Unrecorded
 from enumsol.search.outcome import SearchLimits
-from enumsol.search.space.space_search import SpaceCertifier
-from enumsol.search.space.space_setup import SpaceSolvers
+from enumsol.search.space.space_search import SpaceCertifier, SpaceSolvers
 from enumsol.trusted.space.leaves import distinct_roots
 from enumsol.trusted.space.sector_rows import LEFT, RIGHT, SLIP, sector_row_terms
 from search_in_3d_choices.early import early
@@ -298,7 +297,7 @@ def searched(build, alpha, kind, constants=(), place=None):
         started = process_time()
         solvers = Solvers(problem, alpha, kind, place)
         certifier = solvers.certifier()
-        outcome = solvers.search(certifier, SearchLimits(None, MAX_NODES)).run()
+        outcome = solvers.search(certifier, SearchLimits(max_nodes=MAX_NODES)).run()
         seconds = process_time() - started
     roots = distinct_roots(certifier.certified.verified.items())[0]
     complete = outcome.stopped is None and not outcome.undecided

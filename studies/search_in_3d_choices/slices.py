@@ -91,7 +91,7 @@ def slices(run: Run, solvers, most: int) -> None:
                 started = process_time()
                 one = solvers(problem, alpha, KINDS.get(choice, SpaceRelaxation))
                 certifier = one.certifier()
-                outcome = one.search(certifier, SearchLimits(None, most)).run()
+                outcome = one.search(certifier, SearchLimits(max_nodes=most)).run()
                 seconds = process_time() - started
             row = {"choice": choice, "problem": name, "nodes": outcome.nodes, "leaves": outcome.selections}
             row["roots"] = len(distinct_roots(certifier.certified.verified.items())[0])

@@ -87,7 +87,7 @@ def search(problem, kind, workers, path):
 
 
 def _warm(_):
-    import enumsol.search.parallel  # noqa: F401 (in the worker)
+    import enumsol.search.setup  # noqa: F401 (in the worker)
 
     time.sleep(0.05)
 

@@ -141,9 +141,10 @@ def test_numbers_that_are_too_large_are_refused():
     one = np.ones(problem.p)
     numbers = PieceNumbers(one, one, 0.0 * one), PieceNumbers(one, one, 2.0 * one), PieceNumbers(one, 1e6 * one, one)
     assert [only_roots(asked, each) for each in numbers] == [[True], [False], [False]]
-    assert PieceNumbers(one, one, -one).usable
-    assert not PieceNumbers(one, 0.0 * one, one).usable
-    assert not PieceNumbers(np.inf * one, one, one).usable
+    assert PieceNumbers.of(np.concatenate([one, one, -one]), np.zeros(0)).degree == 1
+    for bad in ((one, 0.0 * one, one), (np.inf * one, one, one)):
+        with pytest.raises(ValueError, match="not positive"):
+            PieceNumbers.of(np.concatenate(bad), np.zeros(0))
 
 
 def test_the_same_with_workers():

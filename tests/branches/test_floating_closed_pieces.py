@@ -38,7 +38,7 @@ def test_one_branch_needs_no_tree_and_no_bound():
     problem, graph, records = proven()
     assert graph.stats.nodes == 0
     assert (graph.stats.closed, graph.stats.bounded) == (1, 0)
-    assert {len(of_kind(records, kind)) > 0 for kind in "moi"} == {True}
+    assert {len(of_kind(records, kind)) > 0 for kind in "qoi"} == {True}
     assert not of_kind(records, "x")
     assert graph.closing_line == "complete: yes (proven)"
     report = accepted_report(problem, graph.proof)
@@ -76,7 +76,7 @@ def test_both_checkers_agree_about_random_bodies():
         report = accepted_report(problem, graph.proof)
         assert check_records(problem, records) == report.selections, seed
         assert (report.within is None) == (graph.stats.bounded == 0), seed
-        closed += bool(of_kind(records, "m"))
+        closed += bool(of_kind(records, "o"))
     assert closed > some(2, of=6)
 
 
@@ -92,46 +92,55 @@ def refused(records, *, by_both=True):
 
 def test_forged_forms():
     records = proven()[2]
-    (place,) = of_kind(records, "m")
-    _, mu, kappa, nu, more = records[place]
-    balance, share, degree = more
+    (place,) = of_kind(records, "q")
+    _, selections, numbers, more = records[place]
+    p, (balance, share, degree) = records[0]["p"], more
     wrong = [
-        ["m", mu, kappa, nu], ["m", mu, kappa, nu, []], ["m", mu, kappa, nu, [balance, share]],
-        ["m", mu, kappa, nu, [-1.0, share, degree]], ["m", mu, kappa, nu, [balance, share, 0]],
-        ["m", mu, kappa, nu, [balance, share, 33]], ["m", mu, kappa, nu, [balance, share, 1.5]],
-        ["m", mu, kappa, nu, [balance, None, degree]], ["m", [-m for m in mu], kappa, nu, more],
-        ["m", mu, kappa, [1e9] * len(mu), more],
-    ]  # fmt: skip
-    for record in wrong:
-        refused(replaced(records, place, record))
-    for record in (["m", mu, kappa, nu, [balance, 100.0, degree]], ["m", mu, [1e6] * len(mu), nu, more]):
+        *([], [balance, share], [-1.0, share, degree], [balance, share, 0], [balance, share, 33]),
+        *([balance, share, 1.5], [balance, None, degree]),
+    ]
+    for others in wrong:
+        refused(replaced(records, place, ["q", selections, numbers, others]))
+    for others in ([-numbers[0], *numbers[1:]], [*numbers[:-p], *[1e9] * p], numbers[1:], [*numbers, 0.0]):
+        refused(replaced(records, place, ["q", selections, others, more]))
+    for others in ([], selections[0], [[*selections[0], 0]], [[9, *selections[0][1:]]], [None]):
+        refused(replaced(records, place, ["q", others, numbers, more]))
+    refused(replaced(records, place, records[place][:3]))
+    steep = [*numbers[:p], *[1e6] * p, *numbers[2 * p :]]
+    for record in (["q", selections, numbers, [balance, 100.0, degree]], ["q", selections, steep, more]):
         # the other checker asks nothing of what G d = 0 makes vanish
         assert "not proven" in refused(replaced(records, place, record), by_both=False)
 
 
 def test_forged_leaves():
     records = proven()[2]
+    p = records[0]["p"]
     for place in of_kind(records, "o"):
-        _, codes, back, rows, products = records[place]
-        assert "not whole" in refused(fewer(records, place))
-        refused(replaced(records, place, ["o", codes, 2, rows, products]))
-        refused(replaced(records, place, ["o", "6" * len(codes), back, rows, products]))
-        refused(replaced(records, place, ["o", codes, back, rows]))
+        _, back, rows, products = records[place]
+        refused(fewer(records, place))
+        refused(replaced(records, place, ["o", 2, rows, products]))
+        refused(replaced(records, place, ["o", 0, rows, products]))
+        refused(replaced(records, place, ["o", back, rows]))
+        refused(replaced(records, place, ["o", back, rows, products, [0.0], [0.0], 1]))
         if products:
-            refused(replaced(records, place, ["o", codes, back, rows, []]))
-            refused(replaced(records, place, ["o", codes, back, rows, [[*products[0][:2], -1.0]]]))
-            refused(replaced(records, place, ["o", codes, back, rows, [[*products[0][:2], 1e9]]]))
+            refused(replaced(records, place, ["o", back, rows, []]))
+            refused(replaced(records, place, ["o", back, rows, [[*products[0][:2], -1.0]]]))
+            refused(replaced(records, place, ["o", back, rows, [[*products[0][:2], 1e9]]]))
         else:
-            refused(replaced(records, place, ["o", codes, back, [], []]))
+            refused(replaced(records, place, ["o", back, [], []]))
         # rows that the root does not have as equations, as its nodes slip or the assignment leaves them free
-        refused(replaced(records, place, ["o", codes, back, [*range(4 * len(codes), 6 * len(codes))], products]))
+        refused(replaced(records, place, ["o", back, [*range(4 * p, 6 * p)], products]))
     for place in of_kind(records, "i"):
-        _, codes, z = records[place]
-        assert "not whole" in refused(fewer(records, place))
+        _, z = records[place]
+        refused(fewer(records, place))
         for direction in ([-x for x in z], [0.0 * x for x in z], z[1:]):
-            refused(replaced(records, place, ["i", codes, direction]))
-        refused(replaced(records, place, ["i", "6" * len(codes), z]))
-        refused(replaced(records, place, ["i", "9" + codes[1:], z]))
+            refused(replaced(records, place, ["i", direction]))
+    # at the root of the tree
+    (form,) = of_kind(records, "q")
+    end = next(k for k, record in enumerate(records) if "traces" in record)
+    for place in of_kind(records, "o", "i"):
+        counts = {**records[-1], "leaves": 1}
+        refused([*records[: form + 1], records[place], *records[end:-1], counts])
 
 
 def fewer(records, place):
@@ -143,18 +152,17 @@ def fewer(records, place):
 
 
 def test_leaves_before_the_form():
-    """Of leaves x before it nobody would tell that they need the bound of the rigid displacement."""
+    """Of leaves x beside arcs it is told whether they need the bound of the rigid displacement."""
     problem = varying(54)
     graph = enumsol.branch_graph(problem, (0, 2))
     records = records_of(graph.proof)
     assert accepted_report(problem, graph.proof).within == problem.rigid_reach
-    (form,), empty = of_kind(records, "m"), of_kind(records, "x")
-    assert min(empty) > form
-    moved = [record for k, record in enumerate(records) if k not in empty]
-    moved[form:form] = [records[k] for k in empty]
-    (failure,) = enumsol.verify(problem, proof_of(moved)).failures
-    assert "before" in failure
-    with pytest.raises(Refused, match="before the form"):
+    (form,) = of_kind(records, "q")
+    assert min(of_kind(records, "x")) > form
+    place = of_kind(records, "o", "i")[0]
+    moved = [*records[:form], *records[form + 1 : place + 1], records[form], *records[place + 1 :]]
+    assert "no" in " ".join(enumsol.verify(problem, proof_of(moved)).failures)
+    with pytest.raises(Refused, match="not declared"):
         check_records(problem, moved)
 
 
@@ -166,9 +174,9 @@ def test_a_branch_on_which_a_node_that_sticks_loses_its_force():
 
 def test_leaves_without_the_form():
     records = copied(proven()[2])
-    (place,) = of_kind(records, "m")
+    (place,) = of_kind(records, "q")
     del records[place]
-    assert "unknown kind of record" in refused(records)
+    assert "not declared" in refused(records)
 
 
 def block_on_slab(push=0.2, slope=1.0):

@@ -16,7 +16,7 @@ import enumsol
 from enumsol.condensation.enclosure import enclosure_of
 from enumsol.condensation.space_condensed import AlphaSpace
 from enumsol.model.sectors import SECTORS, direction, nearest
-from enumsol.search.space.piece_multipliers import AlphaPoint
+from enumsol.search.space.piece_proposals import AlphaPoint
 from enumsol.trusted.space.pieces import AlphaPiece
 from enumsol.trusted.space.sector_rows import CONTACT, NONNEGATIVE, OPEN, STICK, UNDECIDED, row_sign
 

@@ -228,7 +228,7 @@ def test_what_exact_algebra_costs_grows_with_the_digits_of_determinants():
     ratios = []
     for problem, slip in ((gallery.wedge(3, 2), 3), (gallery.dovetail(2, 1), 6), (gallery.dovetail(2, 1), 3)):
         codes = (2,) * slip + (0,) * (problem.p - slip)
-        S = ExactCondensed.from_problem(problem).integers.S
+        S = ExactCondensed.from_problem(problem).integers.rows
         digits = fmpz_mat([[S[i][j] for j in range(slip)] for i in range(slip)]).det().bit_length()
         ratios.append(ways._exact_work(problem, {codes}) / ((slip + 1) * slip**3 * digits))
     assert max(ratios) < 1.5 * min(ratios)

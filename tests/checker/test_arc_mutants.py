@@ -7,7 +7,7 @@ from fractions import Fraction
 
 import numpy as np
 import pytest
-from arc_oracle import ArcOracle, claims, recount
+from arc_oracle import ArcOracle, assignments, claims, recount
 from branches.test_degenerate import pair
 from checker.test_graph_mutants import PATHS
 from complete import accepted_report
@@ -59,7 +59,7 @@ def _moved(rng, value):
 
 
 def change_part(rng, records):
-    parts = records[rng.choice([k for k in of_kind(records, "b") if records[k][4]])][4]
+    parts = records[rng.choice([k for k in of_kind(records, "w") if records[k][4]])][4]
     k, how = rng.randrange(len(parts)), rng.randrange(7)
     part = parts[k]
     if how == 0:  # of another kind
@@ -85,7 +85,7 @@ def change_part(rng, records):
 
 
 def change_box(rng, records):
-    boxes = of_kind(records, "b")
+    boxes = of_kind(records, "w")
     k = rng.choice(boxes)
     how = rng.randrange(6)
     if how == 0:
@@ -110,7 +110,7 @@ def change_box(rng, records):
 
 def _end(records, trace):
     """The place behind a trace and its boxes."""
-    boxes = of_kind(records, "b")
+    boxes = of_kind(records, "w")
     return next(k for k in range(trace + 1, len(records)) if k not in boxes)
 
 
@@ -123,7 +123,7 @@ def change_trace(rng, records):
         records[last:last] = copied(records[k:last])
     elif how == 2:
         j = rng.randrange(len(records[k][1]))
-        records[k][1] = records[k][1][:j] + str(rng.randrange(7)) + records[k][1][j + 1 :]
+        records[k][1] = [*records[k][1][:j], rng.randrange(7), *records[k][1][j + 1 :]]
     elif how == 3:
         records[k][4] = rng.choice((-1, 0, 1))
     elif how == 4:
@@ -132,7 +132,7 @@ def change_trace(rng, records):
     elif how == 5:  # too short, or too long, with its first or last box
         place = rng.choice((2, 3))
         box = records[k + 1 if place == 2 else last - 1]
-        if box[0] == "b" and box[4]:
+        if box[0] == "w" and box[4]:
             records[k][place] = box[place - 1] = value = _moved(rng, records[k][place])
             if place == 3:
                 box[4][-1][1] = value
@@ -144,9 +144,9 @@ def change_trace(rng, records):
 def remove_arc(rng, records):
     """An arc and its events are nowhere; the partners of the events may be removed as well."""
     k = rng.choice(of_kind(records, "t"))
-    codes = {records[k][1]}
+    codes = [records[k][1]]
     if rng.random() < 0.6:
-        codes.add(rng.choice([records[j][1] for j in of_kind(records, "t")]))
+        codes.append(rng.choice([records[j][1] for j in of_kind(records, "t")]))
     for j in of_kind(records, "t"):
         for box in records[j + 1 : _end(records, j)] if records[j][1] in codes else ():
             box[4] = [["n", part[1]] if part[0] in "he" else part for part in box[4]]
@@ -158,13 +158,9 @@ def hide_selection(rng, records):
     if not handed:
         return
     k = rng.choice(handed)
-    codes = records[k][1]
-    if rng.random() < 0.3:
-        records[k][0] = rng.choice("cx")
-    elif rng.random() < 0.3:
-        digits = list(codes)
-        digits[rng.randrange(len(digits))] = str(rng.randrange(7))
-        records[k][1] = "".join(digits)
+    codes = [*assignments(records)[k]]
+    if rng.random() < 0.5:
+        records[k] = rng.choice([["p", "5"], ["x", "", ""]])
     else:
         del records[k]
     if rng.random() < 0.7:
@@ -174,12 +170,13 @@ def hide_selection(rng, records):
 
 
 def add_selection(rng, records):
-    """A selection that is no leaf of the tree, with the trace of another or none."""
+    """A selection that is no leaf of the tree, of arcs that no leaf refers to, with the trace of another or none."""
     handed = of_kind(records, "s")
     if not handed or not of_kind(records, "t"):
         return
-    codes = "".join(rng.choice("01234") for _ in records[handed[0]][1])
-    records.insert(rng.choice(handed), ["s", codes])
+    p = records[0]["p"]
+    codes = [rng.randrange(5) for _ in range(p)]
+    records.insert(rng.choice(handed), ["q", [codes], [1.0] * 3 * p, []])
     first = rng.choice(of_kind(records, "t"))
     last = _end(records, first)
     block = copied(records[first:last])
@@ -210,9 +207,9 @@ def change_head(rng, records):
 def change_type(rng, records):
     """Something of another type where a number, text or list is expected."""
     junk = rng.choice((None, True, "x", "1/0", -1, 10**17, 1e308, -1e308, 5e-324, [], {}, [[]], "9" * 3000, 0.1))
-    k = rng.choice(of_kind(records, "b") + of_kind(records, "t"))
+    k = rng.choice(of_kind(records, "w") + of_kind(records, "t"))
     target = records[k]
-    if target[0] == "b" and target[4] and rng.random() < 0.7:
+    if target[0] == "w" and target[4] and rng.random() < 0.7:
         target = rng.choice(target[4])
     if target:
         target[rng.randrange(len(target))] = junk
@@ -313,14 +310,14 @@ def test_proofs_of_degenerate_graphs_are_accepted():
 def triangle():
     """Records that may be changed, and the place of the trace of the open node."""
     records = copied(original("triangle")[1])
-    return records, next(k for k in of_kind(records, "t") if records[k][1] == "0")
+    return records, next(k for k in of_kind(records, "t") if records[k][1] == [0])
 
 
 def test_a_status_that_a_node_cannot_have_is_refused():
     records, k = triangle()
     last = _end(records, k)
-    records[last:last] = [["t", "4", *records[k][2:]], *copied(records[k + 1 : last])]
-    records.insert(of_kind(records, "s")[0], ["s", "4"])
+    records[last:last] = [["t", [4], *records[k][2:]], *copied(records[k + 1 : last])]
+    records.insert(of_kind(records, "s")[0], ["q", [[4]], [1.0] * 3, []])
     recount(records)
     assert "cannot have" in why_refused(original("triangle")[0], records)
 
@@ -347,16 +344,16 @@ EXTREME = (1.7e308, -1.7e308, 5e-324, 1e-300, "1" + 308 * "0", "1/" + 3999 * "9"
 
 @pytest.mark.parametrize("value", EXTREME, ids=lambda value: str(value)[:12])
 def test_extreme_and_senseless_numbers_are_refused(value):
-    assert not with_boxes(["b", 0.0, value, 0, [["h", value, 1]]])
-    assert not with_boxes(["b", "0", value, 1, [["h", value, 1]]])
+    assert not with_boxes(["w", 0.0, value, 0, [["h", value, 1]]])
+    assert not with_boxes(["w", "0", value, 1, [["h", value, 1]]])
     for first in (value, 1.0):
-        assert not with_boxes(["b", 0.0, 10.0, 0, [["e", 10.0, 1, 0, 1, first, value]]])
+        assert not with_boxes(["w", 0.0, 10.0, 0, [["e", 10.0, 1, 0, 1, first, value]]])
 
 
 def test_boxes_without_parts_are_refused():
-    last = ["b", 0.0, 10.0, 0, [["h", 10.0, 1]]]
+    last = ["w", 0.0, 10.0, 0, [["h", 10.0, 1]]]
     assert with_boxes(last)
-    assert not with_boxes(["b", 0.0, 10.0, 0, []], last)
+    assert not with_boxes(["w", 0.0, 10.0, 0, []], last)
 
 
 @pytest.mark.parametrize("exponents", [(900, -900), (-900, 900), (900, 900), (-900, -900)])

@@ -10,7 +10,7 @@ from generators import integer_problem
 from enumsol.checker.rational import RationalSystem
 from enumsol.condensation.exact import ExactCondensed, ExactSystem
 from enumsol.relaxation.active_set import IntervalSystem
-from enumsol.relaxation.imposed_rows import INEQUALITY, imposed_rows, status_rows
+from enumsol.relaxation.engine import INEQUALITY, imposed_rows, status_rows
 from enumsol.relaxation.interior_point import InteriorPointEngine
 from enumsol.search.certifiers.interval_certifiers import ExactIntervalCertifier
 from enumsol.search.certifiers.rational_certifier import ExactCertifier

@@ -13,7 +13,7 @@ from effort import some
 from graph_proofs import GRAPHS, forms_at_once, without_arcs
 from oracles import exact_solutions
 from proof_fuzz import mutant
-from proof_tools import copied, of_kind, proof_of, records_of
+from proof_tools import by_forms, copied, proof_of, records_of
 from rational_checker import check_records
 
 from enumsol import ProofFormatError, branch_graph, gallery, verify
@@ -85,4 +85,4 @@ def test_the_originals_name_every_selection_that_holds(name):
     assert set().union(*holding.values()) <= report.selections
     # and there is something to lose: selections that hold at some alphas only
     assert len({frozenset(codes) for codes in holding.values()}) > 1
-    assert bool(of_kind(records, "f")) == (name in BY_FORMS)
+    assert bool(by_forms(records)) == (name in BY_FORMS)

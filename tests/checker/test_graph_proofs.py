@@ -1,7 +1,6 @@
 """Proofs of branch graphs are right about which selections hold; forgeries are in test_proof_format."""
 
 from collections import Counter
-from itertools import product
 
 import numpy as np
 import pytest
@@ -9,8 +8,9 @@ from complete import accepted_report, whole_graph
 from graph_proofs import GRAPHS, graph as made
 
 from enumsol import branch_graph, enumerate_roots, gallery, verify
-from enumsol.checker.graph_checker import covers
-from enumsol.trusted.status_rows import children_of
+from enumsol.branches.proof_records import trees
+from enumsol.proof.records import Branching
+from enumsol.trusted.status_rows import children_of, is_covering
 
 
 @pytest.fixture(scope="module", params=["load", "friction", "cut", "unloaded", "both"])
@@ -52,44 +52,33 @@ def test_fast_graphs_have_no_proof():
     assert not graph.complete
 
 
-def covered(roots, leaves, friction):
-    return covers(*(np.array(part, dtype=np.uint8).reshape(-1, len(friction)) for part in (roots, leaves)), friction)
-
-
-def test_cover_of_a_tree_by_its_leaves():
-    assert covered([(6, 6)], [(0, 6), (5, 0), (1, 5), (2, 5), (3, 5)], [True, True])
-    assert not covered([(6, 6)], [(0, 6), (5, 0), (1, 5), (2, 5)], [True, True])
-    assert covered([(6,)], [(0,), (4,)], [False])
-    assert not covered([(6,)], [(0,), (4,)], [True])
-    assert not covered([(6,)], [], [True])
-    assert covered([(0, 6), (5, 0)], [(0, 6), (1, 0), (2, 0), (3, 0)], [True, True])
-    assert not covered([(0, 6), (5, 0)], [(0, 6), (1, 0), (2, 0)], [True, True])
-    # a leaf that is coarser than a root was not found below it
-    assert not covered([(0, 0)], [(0, 6)], [True, True])
-
-
-def selections_in(codes, friction):
-    """Complete selections of a partial assignment, one by one."""
-    final = {6: (0, 1, 2, 3), 5: (1, 2, 3)}
-    choices = [final.get(c, (c,)) if F or c < 5 else (0, 4) for c, F in zip(codes, friction, strict=True)]
-    return set(product(*choices))
-
-
-def test_covers_against_a_list_of_all_selections():
-    rng, outcomes = np.random.default_rng(3), Counter()
+def test_trees_are_made_again_from_their_leaves():
+    """Of several assignments; a checker reads them as trees below these, with the same leaves."""
+    rng, sizes = np.random.default_rng(3), Counter()
     for _ in range(300):
         friction = [bool(rng.random() < 0.8) for _ in range(int(rng.integers(1, 5)))]
         roots = refined(rng, (6,) * len(friction), friction)
         roots = [root for root in roots if rng.random() < 0.6] or roots[:1]
         leaves = [leaf for root in roots for leaf in refined(rng, root, friction)]
-        if rng.random() < 0.5:
-            del leaves[int(rng.integers(len(leaves)))]
-        wanted = set().union(*(selections_in(root, friction) for root in roots))
-        had = set().union(*(selections_in(leaf, friction) for leaf in leaves))
-        found = covered(roots, leaves + leaves[:1], friction)
-        assert found == (wanted <= had)
-        outcomes[found] += 1
-    assert min(outcomes.values()) > 100
+        mixed, found, waiting = [leaves[k] for k in rng.permutation(len(leaves))], [], roots[::-1]
+        for record in trees(roots, mixed, friction):
+            codes = waiting.pop()
+            if isinstance(record, Branching):
+                assert is_covering(codes[record.node], record.children, friction=friction[record.node])
+                waiting += record.below(codes)[::-1]
+            else:
+                assert record == codes
+                found.append(record)
+        assert not waiting
+        assert sorted(found) == sorted(leaves)
+        sizes[len(roots) > 1, len(leaves) > len(roots)] += 1
+    assert min(sizes[several, deep] for several in (True, False) for deep in (True, False)) > 10
+
+
+def test_leaves_that_are_those_of_no_tree():
+    for leaves in ([(0, 6), (5, 0), (1, 5), (2, 5)], [(0, 6), (5, 0)], [(6, 0), (0, 6)]):
+        with pytest.raises(AssertionError, match="no tree"):
+            list(trees([(6, 6)], leaves, [True, True]))
 
 
 def refined(rng, root, friction):

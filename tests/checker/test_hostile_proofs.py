@@ -139,7 +139,7 @@ def test_proofs_of_the_version_before_are_accepted(name):
 
 def test_those_proofs_hold_records_of_every_kind():
     kinds = {record[0] for name in BEFORE for record in records_of(before(name)[1])[1:-1] if isinstance(record, list)}
-    assert kinds == set("bxnrDzusc")
+    assert kinds == set("bxnrDzusp")
 
 
 # -- memory and work ---------------------------------------------------------------------------------------------------

@@ -159,7 +159,7 @@ def test_forged_traces_and_boxes(name):
         assert refused(problem, records[:end] + records[k:end] + records[end:])
         _, low, _, _, parts = records[k + 1]
         for place, entry, value in (
-            *((k, 1, codes + "0"), (k, 1, codes[:-1] + ("1" if codes[-1] != "1" else "0"))),
+            *((k, 1, [*codes, 0]), (k, 1, [*codes[:-1], int(codes[-1] != 1)]), (k, 1, "".join(map(str, codes)))),
             *((k, 2, inside), (k, 3, inside), (k, 4, side + 1)),
             *((k + 1, 1, inside), (k + 1, 2, low), (k + 1, 3, 2)),
             *((k + 1, 4, parts[:-1]), (k + 1, 4, [*parts, parts[-1]])),
@@ -224,7 +224,7 @@ def test_boxes_left_open_may_have_fractions_for_ends():
     """As right of an alpha at which g vanishes in a family."""
     problem, interval = random_graph(integer_problem, 3, 2)
     records = records_of(branch_graph(problem, interval).proof)
-    left = [k for k in of_kind(records, "b") if all(part[0] == "u" for part in records[k][4])]
+    left = [k for k in of_kind(records, "w") if all(part[0] == "u" for part in records[k][4])]
     assert left
     for k in left[:3]:
         kind, low, high, _, parts = records[k]

@@ -11,7 +11,7 @@ from proof_tools import of_kind, proof_of, put, records_of, replaced, why_refuse
 from enumsol import verify
 from enumsol.branches.space.space_graph import ByCurves
 from enumsol.gallery import wedge3d
-from enumsol.search.space.piece_certificates import PieceProposals
+from enumsol.search.space.piece_proposals import ExaminedPiece
 
 INTERVAL = Fraction(0), Fraction(1)
 #: Of a wedge, with a leaf that only its equations show to be without a root.
@@ -26,8 +26,8 @@ def leaf_by_leaf(p, seed):
     """
     cover = ByCurves(random_over_alpha(p, seed), INTERVAL) if p else ByCurves(wedge3d(2, 1, 2), WEDGED)
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(PieceProposals, "numbers", lambda *_: None)
-        patch.setattr(PieceProposals, "is_hopeful", lambda *_: False)
+        patch.setattr(ExaminedPiece, "numbers", lambda *_: None)
+        patch.setattr(ExaminedPiece, "is_hopeful", lambda *_: False)
         cover.search(max_nodes=100)
     return cover.problem, records_of(cover.proof())
 
@@ -88,7 +88,7 @@ def test_a_curve_alone_says_nothing():
     place = records.index({"tree": True}) + 1
     claim = {"curves": 1, "arcs": None, "leaves": 1, "gaps": 0}
     assert "claimed where statuses are still open" in why_refused(problem, [*records[:place], ["n"], claim])
-    assert "tree over alpha ends before all of it is decided" in why_refused(problem, records[:place])
+    assert "the tree breaks off" in why_refused(problem, records[:place])
 
 
 @pytest.mark.parametrize(
@@ -110,7 +110,7 @@ def test_a_curve_alone_says_nothing():
         (ARCS, "t", lambda record: ["t", True, *record[2:]], "there is no box True"),
         (ARCS, "t", lambda _: ["n"], "not proven to hold no root"),
         (NONE, "n", lambda _: ["q"], "unknown kind of record 'q'"),
-        (NONE, "n", lambda _: [], "unknown kind of record None"),
+        (NONE, "n", lambda _: [], "the tree breaks off"),
         (ARCS, "x", lambda _: ["x", [], "", ""], "its multipliers do not exclude it"),
         (ARCS, "x", lambda record: ["x", record[1][1:], *record[2:]], "rows and"),
         (ARCS, "x", lambda record: ["x", *record[2:], record[2]], "its form was not declared"),

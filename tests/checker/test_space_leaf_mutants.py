@@ -11,7 +11,7 @@ from proof_tools import copied, of_kind, proof_of, put, put_in_all, records_of, 
 from trees import by_the_tree
 
 from enumsol import verify
-from enumsol.search.space.space_setup import SpaceSolvers
+from enumsol.search.space.space_search import SpaceSolvers
 
 _BOX, _BOX_RAD, _RHO, _MID, _RAD, _INDEX = range(1, 7)
 SEEDS = (2, 7, 47, 26)

@@ -191,7 +191,7 @@ def test_audit_reads_stdin(capsys, points, monkeypatch):
 def test_audit_reads_points_before_it_searches(capsys, tmp_path, monkeypatch):
     file = tmp_path / "bad.csv"
     file.write_text("alpha,lambda_n_0\n1,2\n2,2\n")
-    monkeypatch.setattr("enumsol.cli.audit.build", lambda *_, **__: pytest.fail("the graph was built"))
+    monkeypatch.setattr("enumsol.cli.graph.build", lambda *_, **__: pytest.fail("the graph was built"))
     assert_refused(*run(capsys, *AUDIT, file), "no column 'lambda_t_0'")
 
 
@@ -201,7 +201,7 @@ def test_ctrl_c_audits_what_was_found(capsys, points, monkeypatch):
     def interrupted(*_, **__):
         raise Interrupted("interrupted", partial)
 
-    monkeypatch.setattr("enumsol.cli.audit.build", interrupted)
+    monkeypatch.setattr("enumsol.cli.graph.build", interrupted)
     assert "but the graph is not complete: stopped" in printed(capsys, *AUDIT, points, status=130)
 
 

@@ -9,7 +9,7 @@ from command_line import assert_refused, printed, run
 from complete import complete_report
 
 from enumsol import History, Proof, verify, write_problem
-from enumsol.report import history_page
+from enumsol.report import roots_page
 
 NODE = ("history", "gallery:one-node-6.1")
 
@@ -46,7 +46,7 @@ def test_everything_is_written(capsys, wedge, tmp_path, pulled_wedge):
 
 
 def test_one_node_is_pressed_and_released(capsys, tmp_path, monkeypatch):
-    monkeypatch.setattr(history_page, "_image", lambda figure, words: f"<p>Picture of {words}.</p>")
+    monkeypatch.setattr(roots_page, "_image", lambda figure, words: f"<p>Picture of {words}.</p>")
     files = {name: tmp_path / f"out.{name}" for name in ("report", "json", "csv")}
     options = [part for name, path in files.items() for part in (f"--{name}", path)]
     printed(capsys, *NODE, "--steps", "1,1/2", *options, "--arithmetic", "fast", "--title", "Pressed & released")

@@ -10,7 +10,7 @@ from refusals import bad_argument
 
 import enumsol
 from enumsol import collection
-from enumsol.auditing.known_solutions import hull_distance
+from enumsol.auditing.results import hull_distance
 
 WEDGE, NODE, SEGMENT = (collection.get(name) for name in ("wedge-8-5", "node-3d-3", "triangle-continuum"))
 ROOTS = WEDGE.certified().roots

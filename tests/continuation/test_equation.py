@@ -8,7 +8,7 @@ from refusals import bad_argument
 import enumsol
 from enumsol import ContactStatus, PiecewiseSmoothEquation, enumerate_roots, gallery, sign_array
 from enumsol.model.statuses import STATUSES
-from enumsol.search.exhaustive import selection_systems
+from enumsol.roots.enumerate import selection_systems
 
 OPEN, STICK, SLIP_PLUS, SLIP_MINUS = STATUSES
 NAMES = {OPEN: (-1, -1, -1), STICK: (1, -1, 1), SLIP_PLUS: (1, 1, 1), SLIP_MINUS: (1, -1, -1)}

@@ -13,7 +13,7 @@ from refusals import bad_argument, refusal
 import enumsol
 from enumsol.continuation import SmoothPath, follow, newton
 from enumsol.continuation.condensed_equation import SLIP
-from enumsol.continuation.start import equation_on
+from enumsol.continuation.newton import equation_on
 from enumsol.model.statuses import OPEN, SLIP_MINUS, SLIP_PLUS, STICK
 
 

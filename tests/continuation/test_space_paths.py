@@ -12,7 +12,7 @@ from refusals import bad_argument
 import enumsol
 from enumsol.continuation import SmoothPath, follow, newton, start_tangents
 from enumsol.continuation.condensed_equation import SLIP, DiscEquation
-from enumsol.continuation.start import equation_on
+from enumsol.continuation.newton import equation_on
 from enumsol.model.statuses import OPEN, STICK
 
 

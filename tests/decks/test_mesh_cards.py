@@ -5,6 +5,8 @@ import pytest
 from refusals import bad_argument
 from written_decks import SQUARE, labels, read, unused
 
+from enumsol.decks.cards import DeckPlace
+
 GRID = "*NODE\n" + "".join(f"{1 + k},{k % 4},{k // 4}\n" for k in range(12)) + "*ELEMENT,TYPE=CPE4,ELSET=ALL\n"
 GRID += "".join(f"{10 * k},{a},{a + 1},{a + 5},{a + 4}\n" for k, a in enumerate((1, 2, 3, 5, 6, 7), 1))
 
@@ -164,8 +166,9 @@ def test_instances_of_parts(tmp_path):
     assert [deck.spelled[name] for name in ("HELD", "UP-2.TOP")] == ["Held", "Up-2.Top"]
     for name, rows in (("Up-1.3", [7]), ("low-1.top", [3, 4]), ("7", [0]), ("held", [1, 2, 7, 8])):
         assert deck.nodes_of(name, None).tolist() == rows
-    bad_argument("^here: node 'Up-1.9' is not in the deck; expected a number or a set", deck.nodes_of, "Up-1.9", "here")
-    bad_argument("^here: element '1' is not in the deck", deck.elements_of, "1", "here")
+    here = DeckPlace("here", 3)
+    bad_argument("^here line 3: node 'Up-1.9' is not in the deck; expected a number or", deck.nodes_of, "Up-1.9", here)
+    bad_argument("^here line 3: element '1' is not in the deck", deck.elements_of, "1", here)
 
 
 @pytest.mark.parametrize(

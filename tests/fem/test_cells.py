@@ -12,9 +12,9 @@ from skfem.models.elasticity import linear_elasticity
 import enumsol
 from enumsol import fem
 from enumsol.fem.bases import isotropic, nodal_basis
-from enumsol.fem.cell_blocks import as_cells_have, joined
+from enumsol.fem.meshes import as_cells_have, joined
 from enumsol.model.cells import KINDS, by_kind, padded
-from enumsol.model.mass import consistent_mass
+from enumsol.model.mesh import consistent_mass
 
 STEEL = {"young": 2.0, "poisson": 0.3}
 LAME = fem.lame(**STEEL)

@@ -6,7 +6,7 @@ import scipy.sparse as sp
 
 import enumsol
 from enumsol import fem
-from enumsol.model.mass import consistent_mass
+from enumsol.model.mesh import consistent_mass
 
 MATERIAL = {"young": 2.5, "poisson": 0.25, "friction": 0.5, "load": {"top": (0.3, -1.0)}}
 TRIANGLE, TETRAHEDRON = [[0, 0], [1, 0], [0, 1]], [[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]]

@@ -7,7 +7,7 @@ from parted_solids import solid
 from refusals import bad_argument
 
 from enumsol import fem
-from enumsol.fem.materials import orthotropic_moduli
+from enumsol.fem.bodies import orthotropic_moduli
 
 #: E1, E2, E3, nu12, nu13, nu23, G12, G13, G23.
 WOOD = (10.0, 2.0, 1.0, 0.3, 0.35, 0.4, 1.5, 1.2, 0.4)

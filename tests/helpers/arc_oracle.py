@@ -71,8 +71,8 @@ def claims(records):
     codes = side = end = None
     for record in records:
         if isinstance(record, list) and record[0] == "t":
-            codes, side, end = tuple(map(int, record[1])), record[4], record[2]
-        elif isinstance(record, list) and record[0] == "b":
+            codes, side, end = tuple(record[1]), record[4], record[2]
+        elif isinstance(record, list) and record[0] == "w":
             end = record[1]
             for part in record[4]:
                 yield codes, side, part, number(end)
@@ -85,7 +85,7 @@ def arc_count(records):
     for record in records:
         if isinstance(record, list) and record and record[0] == "t":
             holds = False
-        if isinstance(record, list) and record and record[0] == "b":
+        if isinstance(record, list) and record and record[0] == "w":
             for part in record[4]:
                 if part[0] in ("h", "e"):
                     rising = part[0] == "e" and part[4] == 1
@@ -96,9 +96,40 @@ def arc_count(records):
     return count
 
 
+def assignments(records):
+    """Codes of the leaves over pieces by their places, as far as the records of a graph in 2D make sense."""
+    found, due, waiting, cut = {}, [], [], []
+    try:
+        whole = (6,) * records[0]["p"]
+        for k, record in enumerate(records[1:], start=1):
+            if isinstance(record, dict):
+                if "piece" not in record:
+                    break
+                due += [cut, cut] if cut else []
+                waiting, cut = (due.pop() if due else [whole])[::-1], []
+            elif record[0] == "b":
+                codes, (_, node, children) = waiting.pop(), record
+                waiting += [(*codes[:node], code, *codes[node + 1 :]) for code in reversed(children)]
+            elif record[0] != "q":
+                found[k] = waiting.pop()
+                cut += [found[k]] if record[0] == "p" else []
+    except (KeyError, TypeError, ValueError, IndexError):
+        pass
+    return found
+
+
+def survivors(records):
+    """Selections that survive, of leaves and of forms of arcs."""
+    found = {codes for k, codes in assignments(records).items() if records[k][0] == "s"}
+    declared = [record for record in records if isinstance(record, list) and record[:1] == ["q"] and len(record) > 1]
+    for _, codes, *_ in declared:
+        found |= {tuple(each) for each in codes if isinstance(each, list)} if isinstance(codes, list) else set()
+    return found
+
+
 def recount(records):
     """Make the counts of a graph's proof fit, as somebody would who wants to be believed."""
-    lists = [record for record in records if isinstance(record, list) and len(record) > 1]
+    lists = [record for record in records if isinstance(record, list) and record]
     heads = [record for record in records[:-1] if isinstance(record, dict) and "traces" in record]
     traces = sum(record[0] == "t" for record in lists)
     for head in heads[:1]:
@@ -107,8 +138,8 @@ def recount(records):
         arcs = {"traces": traces, "arcs": arc_count(records)} if heads or "arcs" in records[-1] else {}
         records[-1] = arcs | {
             "pieces": sum(isinstance(record, dict) and "piece" in record for record in records),
-            "leaves": sum(record[0] in ("x", "f") for record in lists),
-            "selections": len({str(record[1]) for record in lists if record[0] == "s"}),
+            "leaves": sum(record[0] in ("x", "i", *"o" * ("max_rigid_displacement" in records[0])) for record in lists),
+            "selections": len(survivors(records)),
         }
 
 

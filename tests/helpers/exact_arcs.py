@@ -4,7 +4,7 @@ from functools import cached_property
 from itertools import pairwise
 
 import numpy as np
-from flint import arb, arb_mat, fmpq, fmpq_mat
+from flint import arb, fmpq, fmpq_mat
 
 from enumsol.arithmetic.algebraic import CriticalAlpha, merge, rational_between, real_roots
 from enumsol.arithmetic.balls import Ball
@@ -13,9 +13,8 @@ from enumsol.branches.enclosed.zeros import zeros_of
 from enumsol.condensation.exact import ExactCondensed
 from enumsol.model.statuses import RowKind
 from enumsol.selections.functions import SelectionFunctions
-from enumsol.trusted.arcs.many_digits import precision
-from enumsol.trusted.arcs.precise import PreciseSystem
 from enumsol.trusted.arcs.selection_balls import ArcSystem
+from enumsol.trusted.arcs.taylor import precision
 from enumsol.trusted.selection import Selection
 from enumsol.trusted.status_rows import FRICTIONLESS
 
@@ -76,8 +75,7 @@ def precise_system(data):
     """In balls of many digits."""
     S, g0, g1, F0, F1 = data
     with precision():
-        lists = ([arb(float(x)) for x in part] for part in (g0, g1, F0, F1))
-        return PreciseSystem(arb_mat(S.tolist()), *lists)
+        return ArcSystem(*(np.frompyfunc(arb, 1, 1)(part) for part in (S, g0, g1)), F0, F1)
 
 
 def exact_of(parts):

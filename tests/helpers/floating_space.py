@@ -7,7 +7,7 @@ import scipy.sparse as sp
 
 import enumsol
 from enumsol import fem
-from enumsol.search.space.space_setup import SpaceSolvers
+from enumsol.search.space.space_search import SpaceSolvers
 
 #: Solutions farther away are beyond the bound of the rigid displacement.
 _FAR = 1e4

@@ -13,7 +13,7 @@ from rational_checker import check_records
 from rational_forms import Refused
 
 from enumsol import ContactProblem, branch_graph, gallery, verify
-from enumsol.search import form_policy as forms, interval_tree
+from enumsol.search import interval_tree, nodes as forms
 
 
 def triangle(**data):
@@ -59,6 +59,11 @@ def forms_at_once():
         yield
 
 
+def forms_of_arcs(records):
+    """Places of the records that declare forms of arcs."""
+    return [k for k in of_kind(records, "q") if isinstance(records[k][1][0], list)]
+
+
 def accepted(problem, records):
     try:
         check_records(problem, records)
@@ -75,7 +80,7 @@ def refused(problem, records):
 
 def parts_of(records, *kinds):
     """Box, place in it, beginning and part of every part of these kinds."""
-    for k in of_kind(records, "b"):
+    for k in of_kind(records, "w"):
         begin = records[k][1]
         for i, part in enumerate(records[k][4]):
             if part[0] in kinds:
@@ -94,9 +99,9 @@ def cut_in_two(records):
     """The proof of one piece as one that leaves its selections to both halves."""
     arcs = next(k for k, record in enumerate(records) if "traces" in record)
     header, piece, *leaves = records[:arcs]
-    (a, b), selections = (Fraction(end) for end in piece["piece"]), [leaf for leaf in leaves if leaf[0] == "s"]
+    a, b = (Fraction(end) for end in piece["piece"])
     middle = str((a + b) / 2)
-    changed = [header, piece, *(["c", leaf[1]] if leaf[0] == "s" else leaf for leaf in leaves)]
+    changed = [header, piece, *(["p", middle] if leaf == ["s"] else leaf for leaf in leaves)]
     for ends in ([piece["piece"][0], middle], [middle, piece["piece"][1]]):
-        changed += [{**piece, "piece": ends, "roots": [leaf[1] for leaf in selections]}, *selections]
+        changed += [{**piece, "piece": ends}, *([["s"]] * leaves.count(["s"]))]
     return [*changed, *records[arcs:-1], {**records[-1], "pieces": 3}]

@@ -194,15 +194,13 @@ def _numbers(rng, records, _):
     """Multipliers."""
     changed = copied(records)
     lists = [k for k, record in enumerate(changed) if isinstance(record, list) and record]
-    # the rows of those of 3D are a list, which the mutations of fields reach; in graphs in 2D codes come before them
-    begin = 2 if records[0].get("kind") == "graph" else 1
-    texts = {k: [isinstance(part, str) for part in changed[k][begin : begin + 2]] for k in lists}
+    # the rows of those of 3D are a list, which the mutations of fields reach
+    texts = {k: [isinstance(part, str) for part in changed[k][1:3]] for k in lists}
     places = [k for k in lists if changed[k][0] == "x" and len(texts[k]) == 2 and all(texts[k])]
     if not places:
         return _nudge(rng, records, _)
     at = _pick(rng, places)
-    head, tail = changed[at][:begin], changed[at][begin + 2 :]
-    rows, values = multipliers(["x", *changed[at][begin : begin + 2]])
+    rows, values = multipliers(changed[at])
     for _ in range(int(rng.integers(1, 3))):
         how = int(rng.integers(7))
         j = int(rng.integers(len(values))) if values else 0
@@ -220,10 +218,10 @@ def _numbers(rng, records, _):
             values = [v * 1e300 for v in values]
         else:
             values = [-v for v in values]
-    changed[at] = [*head, *with_multipliers(["x", "", ""], rows, values)[1:], *tail]
+    changed[at] = with_multipliers(changed[at], rows, values)
     if rng.random() < 0.1:
         text = base64.b64encode(struct.pack("<3I", 1, 2, 3)).decode()
-        changed[at][begin] = _pick(rng, (text, text[:-1], text + "=", text + "\u00e9", 5, None))
+        changed[at][1] = _pick(rng, (text, text[:-1], text + "=", text + "\u00e9", 5, None))
     return _sealed_lines(_lines(changed))
 
 
@@ -239,7 +237,7 @@ def _bomb(rng, records, _):
     if how == 0:
         lines[at:at] = [lines[int(rng.integers(len(lines)))]] * count
     elif how == 1:
-        short = "[]", "{}", '["u",""]', '["n"]', '["c","6"]', '["b",0,[0,5]]', "null", "", " "
+        short = "[]", "{}", '["u",""]', '["n"]', '["p","1"]', '["s"]', '["b",0,[0,5]]', "null", "", " "
         lines[at:at] = [_pick(rng, short)] * count
     elif how == 2:
         lines[at] = "[" + ",".join([_pick(rng, ("0", "[]", '""', "{}", '"0/1"'))] * count) + "]"
@@ -272,10 +270,8 @@ def each_number(records):
         for path in _places(record):
             for new in _others(reduce(getitem, path, record), record, path):
                 yield place, put([record], (0, *path), new)[0]
-        at = 2 if isinstance(record, list) and record[0] in "xf" and records[0].get("kind") == "graph" else 1
-        for rows, values in _other_multipliers(record, at, p):
-            packed = with_multipliers(["x", "", ""], rows, values)[1:]
-            yield place, [*record[:at], *packed, *record[at + 2 :]]
+        for rows, values in _other_multipliers(record, p):
+            yield place, with_multipliers(record, rows, values)
 
 
 def _others(old, record, path):
@@ -309,11 +305,11 @@ def _fraction(value, base, slash):
     return sign + (digits if slash or value.denominator > 1 else str(above))
 
 
-def _other_multipliers(record, at, p):
+def _other_multipliers(record, p):
     """Other rows and multipliers in the place of those of a record, if it has some in base64."""
-    if not isinstance(record, list) or record[0] not in ("x", "f") or not isinstance(record[at], str):
+    if not isinstance(record, list) or record[0] != "x" or not isinstance(record[1], str):
         return
-    rows, values = multipliers(["x", *record[at : at + 2]])
+    rows, values = multipliers(record)
     for j, (row, value) in enumerate(zip(rows, values, strict=True)):
         for other in (*_sizes(value), float("inf"), float("nan")):
             yield rows, [*values[:j], other, *values[j + 1 :]]

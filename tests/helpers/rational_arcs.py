@@ -255,7 +255,7 @@ class Arcs:
         while position < len(records):
             start = position
             position += 1
-            while position < len(records) and records[position][0] == "b":
+            while position < len(records) and records[position][0] == "w":
                 position += 1
             self._traces.append(self._trace(records[start], records[start + 1 : position]))
         need(integer(head["traces"]) == len(self._traces), "another number of traces")
@@ -270,13 +270,13 @@ class Arcs:
         return {"traces": len(self._traces), "arcs": sum(trace.arcs for trace in self._traces)}
 
     def _trace(self, record, boxes):
-        kind, text, low, high, side = record
+        kind, codes, low, high, side = record
         need(kind == "t" and integer(side) in (-1, 0, 1), "no trace")
-        low, high = alpha_of(low), alpha_of(high)
+        low, high, codes = alpha_of(low), alpha_of(high), tuple(map(integer, codes))
         belongs = [
             due
             for due in self._due
-            if "".join(map(str, due[0])) == text and _beside(low, due[1]) and _beside(-high, -due[2]) and due[3] == side
+            if due[0] == codes and _beside(low, due[1]) and _beside(-high, -due[2]) and due[3] == side
         ]
         need(belongs, "a trace is about no surviving selection")
         first = min(belongs, key=lambda due: due[1])

@@ -5,7 +5,6 @@ It imports nothing of enumsol; of a ContactProblem it reads the arrays. Numbers 
 
 import hashlib
 import json
-import re
 import zlib
 from functools import lru_cache
 from itertools import pairwise, product
@@ -49,7 +48,7 @@ ALLOWED = {
     7: "+.E++..",
     8: "+.+E+..",
     "undecided, F = 0": "+E+++..",
-    # [7.2] slip where friction is not constant
+    # [7.2] slip where friction is not constant over a piece
     "slip+": "+.++E+.+.",
     "slip-": "+.++E.+.+",
 }
@@ -146,6 +145,15 @@ class Proof:
         need(len({a + b for a, b in zip(force, length, strict=True)}) == 1, "units do not fit together")
         return [[fmpq(2) ** value for value in values[:p]] for values in (length, force)]
 
+    def split(self, codes, record):
+        """[5.2]"""
+        _, node, children = record
+        need(0 <= integer(node) < self.p, "no such node")
+        ways = {5: ["123"], 6: ["05", "137", "128"] if self.friction[node] else ["04"], 7: ["02"], 8: ["03"]}
+        found = "".join(map(str, sorted(map(integer, children))))
+        need(found in ways.get(codes[node], ()), "a split does not cover")
+        return [(*codes[:node], code, *codes[node + 1 :]) for code in children]
+
     def terms(self, codes, packed, units, friction, varying=()):
         """[4.4], [4.6] Rows and multipliers in the problem's units, if they are allowed."""
         found = []
@@ -212,14 +220,6 @@ class Point(Proof):
         counts |= {"undecided": self.undecided, "leaves": self.leaves}
         need(are(records[position:], [counts]), f"the footer is not {counts}")
         return counts
-
-    def split(self, codes, record):
-        _, node, children = record
-        need(0 <= integer(node) < self.p, "no such node")
-        ways = {5: ["123"], 6: ["05", "137", "128"] if self.friction[node] else ["04"], 7: ["02"], 8: ["03"]}
-        found = "".join(map(str, sorted(map(integer, children))))
-        need(found in ways.get(codes[node], ()), "a split does not cover")
-        return [(*codes[:node], code, *codes[node + 1 :]) for code in children]
 
     def leaf(self, codes, kind, *rest):
         """[5.3], [6]"""
@@ -370,6 +370,14 @@ class FloatingPoint(Point):
         self.references.declare(selection, weights, *more)
 
 
+class Piece:
+    """[7.1] A piece, its units, forms at both ends, what was declared over it, and what it leaves to its halves."""
+
+    def __init__(self, ends, units, forms):
+        self.ends, self.units, self.forms = ends, units, forms
+        self.declared, self.cut = [], []
+
+
 class Graph(Proof):
     """[7]"""
 
@@ -377,10 +385,12 @@ class Graph(Proof):
         super().__init__(problem, header)
         self.a, self.b = (decimal_fraction(end) for end in header["interval"])
         need(self.a < self.b, "the interval is empty")
-        need(min(self.data.friction(self.a) + self.data.friction(self.b)) >= 0, "friction is negative")
+        F = self.data.friction(self.a), self.data.friction(self.b)
+        need(min(F[0] + F[1]) >= 0, "friction is negative")
+        self.friction = [max(pair) > 0 for pair in zip(*F, strict=True)]
         self.origin = self.starts()
         self.pieces = self.leaves = 0
-        #: Codes of the surviving selections, with the pieces in which they survive.
+        #: Codes of the surviving selections, with the pieces in which they survive, each once.
         self.handed_on, self.closed = {}, []
 
     def run(self, records):
@@ -388,20 +398,20 @@ class Graph(Proof):
         ends = [self.a, self.b]
         if self.origin is not None and self.a < self.origin < self.b:
             ends.insert(1, self.origin)
-        due, position = [(x, y, ["6" * self.p]) for x, y in pairwise(ends)], 0
+        due, position = [(x, y, [(6,) * self.p]) for x, y in pairwise(ends)], 0
         while due:
             x, y, roots = due.pop(0)
             piece = records[position]
-            need(set(piece) == {"piece", "roots", "force", "length"}, "a piece has other names")
+            need(set(piece) == {"piece", "force", "length"}, "a piece has other names")
             need([decimal_fraction(end) for end in piece["piece"]] == [x, y], "another piece is due")
-            need(sorted(piece["roots"]) == sorted(roots), "other roots are due")
-            start = position = position + 1
-            while isinstance(records[position], list):
-                position += 1
-            cut = self.piece(x, y, roots, self.units(piece), records[start:position])
-            if cut:
+            over, position = self.over(x, y, self.units(piece)), position + 1
+            for root in roots:
+                position = self.tree(over, root, records, position)
+            self.pieces += 1
+            self.closed += [arcs for arcs in over.declared if isinstance(arcs, ClosedPiece) and arcs.leaves]
+            if over.cut:
                 middle = (x + y) / 2
-                due[:0] = [(x, middle, cut), (middle, y, cut)]
+                due[:0] = [(x, middle, over.cut), (middle, y, over.cut)]
         counts = {"pieces": self.pieces, "leaves": self.leaves, "selections": len(self.handed_on)}
         if "pieces" not in records[position]:
             need(set(records[position]) == {"traces", "force", "length"}, "arcs begin with other names")
@@ -416,68 +426,90 @@ class Graph(Proof):
         need(are(records[position:], [counts]), f"the footer is not {counts}")
         return set(self.handed_on)
 
-    def piece(self, x, y, roots, units, leaves):
-        """[7.2] Check a piece; the codes that are left to its halves."""
+    def over(self, x, y, units):
+        """[7.2] What the tests of a piece are about."""
         ends = list(zip(self.data.friction(x), self.data.friction(y), strict=True))
-        F_lo, F_hi = [min(pair) for pair in ends], [max(pair) for pair in ends]
-        friction = [value > 0 for value in F_hi]
-        varying = {i for i, slope in enumerate(self.data.F1) if slope != 0}
         loads = [self.data.load(x), self.data.load(y)]
         if self.origin in (x, y):
             loads = [[value if x == self.origin else -value for value in self.data.g1]]
-        forms = self.forms_of((x, y), loads, F_hi, F_lo)
-        covered, cut, declared = set(), [], None
-        kinds = [record[0] for record in leaves]
-        closed = "m" in kinds
-        if closed:
-            need(roots == ["6" * self.p], "a piece closed by its arcs is not whole")
-            allowed = {"m", "s", *self.beside_arcs}
-            need(kinds.count("m") == 1 and set(kinds) <= allowed, "a piece closed by its arcs holds more than that")
-            need(not {"o", "i", "x"} & set(kinds[: kinds.index("m")]), "leaves are before the form")
-            beside = [(kind, self.codes(text, 8), *rest) for kind, text, *rest in leaves if kind in self.beside_arcs]
-            self.leaves += sum(kind != "x" for kind, *_ in beside)
-        for kind, text, *rest in leaves:
-            if kind == "m":
-                self.closed.append(self.closed_piece(x, y, [text, *rest], beside))
-                continue
-            if closed and kind in self.beside_arcs and kind != "x":
-                continue
-            if kind == "q":
-                declared = [list(map(exact, values)) for values in (text, *rest)]
-                need([len(values) for values in declared] == [self.p] * 4, "a form has another size")
-                need(min(declared[2] + declared[3]) >= 0, "a multiplier of a form is negative")
-                continue
-            codes = self.codes(text, 8 if closed else 6)
-            covered.update(self.selections_below(codes, friction))
-            if kind == "x":
-                self.leaves += 1
-                terms = self.terms(codes, rest, units, friction, varying)
-                need(self.excluded(forms, terms), "multipliers do not exclude a leaf")
-                continue
-            if kind == "f":
-                self.leaves += 1
-                need(declared is not None, "a form is missing")
-                terms = self.terms(codes, rest, units, friction, varying)
-                excluded = (form.excludes_by(form.own_form(declared), [], terms) for form in forms)
-                need(all(excluded), "a form does not exclude a leaf")
-                continue
-            need(kind in ("s", "c") and not rest, "an unknown leaf")
-            if kind == "c":
-                cut.append(text)
+        forms = self.forms_of((x, y), loads, [max(pair) for pair in ends], [min(pair) for pair in ends])
+        return Piece((x, y), units, forms)
+
+    def tree(self, over, root, records, position):
+        """[5.2] Check the tree of a root; the place after it."""
+        due = [root]
+        while due:
+            codes, record = due.pop(), records[position]
+            position += 1
+            need(isinstance(record, list) and record, "the tree breaks off")
+            if record[0] == "b":
+                due += reversed(self.split(codes, record))
+            elif record[0] == "q":
+                self.declare(over, *record[1:])
+                due.append(codes)
             else:
-                need(max(codes) < 5, "a surviving selection is not complete")
-                need(self.selections_below(codes, friction), "a node cannot have its code")
-                self.handed_on.setdefault(codes, []).append((x, y))
-        for root in () if closed else roots:
-            need(covered.issuperset(self.selections_below(self.codes(root), friction)), "a selection is in no leaf")
-        self.pieces += 1
-        return cut
+                self.leaf(over, codes, *record)
+        return position
 
-    #: Leaves of pieces that are closed by their arcs.
-    beside_arcs = ()
+    #: Leaves of floating bodies, beside those of all.
+    own_leaves = ()
 
-    def closed_piece(self, x, y, lists, beside):
-        return ClosedPiece(self.data, x, y, *lists)
+    def declare(self, over, codes, numbers, more):
+        """[7.2]"""
+        if codes and isinstance(codes[0], list):
+            for selection in codes:
+                chosen = tuple(map(integer, selection))
+                pairs = zip(chosen, self.friction, strict=True)
+                need(all(refinements(code, rubs) == (code,) for code, rubs in pairs), "a selection is not complete")
+                self.handed_on.setdefault(chosen, {})[over.ends] = None
+            need(len(numbers) == 3 * self.p, "a form of arcs has other numbers")
+            lists = [numbers[k * self.p : (k + 1) * self.p] for k in range(3)]
+            over.declared.append(self.arcs_of(over, lists, more))
+            return
+        need(not self.own_leaves, "a form that rests on a definite stiffness")
+        need(are(codes, [6] * self.p) and len(numbers) == 4 * self.p and more == [], "a form has another size")
+        numbers = list(map(exact, numbers))
+        need(min(numbers[2 * self.p :]) >= 0, "a multiplier of a form is negative")
+        over.declared.append([numbers[k * self.p : (k + 1) * self.p] for k in range(4)])
+
+    def arcs_of(self, over, lists, more):
+        need(more == [], "a form has another size")
+        return ClosedPiece(self.data, *over.ends, *lists)
+
+    def leaf(self, over, codes, kind, *rest):
+        """[7.2]"""
+        need(kind in ("x", "s", "p", "o", *self.own_leaves), "an unknown leaf")
+        if kind == "x":
+            self.leaves += 1
+            varying = {i for i, slope in enumerate(self.data.F1) if slope != 0}
+            terms = self.terms(codes, rest[:2], over.units, self.friction, varying)
+            if len(rest) == 2:
+                need(self.excluded(over.forms, terms), "multipliers do not exclude a leaf")
+                return
+            form = self.declared_before(over, *rest[2:], list)
+            excluded = (one.excludes_by(one.own_form(form), [], terms) for one in over.forms)
+            need(all(excluded), "a form does not exclude a leaf")
+        elif kind == "p":
+            (alpha,) = rest
+            need(2 * decimal_fraction(alpha) == sum(over.ends), "a piece is not cut in its middle")
+            over.cut.append(codes)
+        elif kind == "s":
+            need(not rest, "a leaf says more")
+            need(max(codes) < 5, "a surviving selection is not complete")
+            self.handed_on.setdefault(codes, {})[over.ends] = None
+        else:
+            self.beside_arcs(over, codes, kind, *rest)
+
+    def beside_arcs(self, over, codes, kind, back, rows, pairs):
+        """[7.2, o]"""
+        need(rows == pairs == [], "a leaf has rows")
+        self.declared_before(over, back, ClosedPiece).leaves.append((kind, codes))
+
+    @staticmethod
+    def declared_before(over, back, kind):
+        need(1 <= integer(back) <= len(over.declared), "a form was not declared")
+        need(isinstance(over.declared[-back], kind), "a form is of another kind")
+        return over.declared[-back]
 
     def starts(self):
         """[7.1] alpha_0."""
@@ -490,14 +522,6 @@ class Graph(Proof):
     def excluded(forms, terms):
         return all(form.excludes(terms) for form in forms)
 
-    @staticmethod
-    def selections_below(codes, friction):
-        return list(product(*(refinements(code, positive) for code, positive in zip(codes, friction, strict=True))))
-
-    def codes(self, text, most=6):
-        need(re.fullmatch(f"[0-{most}]{{{self.p}}}", text, re.ASCII), "no codes")
-        return tuple(map(int, text))
-
 
 class FloatingGraph(Graph):
     """[7], [3.2]"""
@@ -506,18 +530,19 @@ class FloatingGraph(Graph):
         super().__init__(problem, header)
         self.same_bound(header)
 
-    beside_arcs = ("o", "i", "x")
+    own_leaves = ("i",)
 
-    def closed_piece(self, x, y, lists, beside):
-        return FloatingPiece(self.data, x, y, *lists, beside)
+    def arcs_of(self, over, lists, more):
+        return FloatingPiece(self.data, *over.ends, *lists, more)
+
+    def beside_arcs(self, over, codes, kind, *rest):
+        """[7.2, o and i]"""
+        self.leaves += 1
+        back = rest[0] if kind == "o" else 1
+        self.declared_before(over, back, ClosedPiece).leaves.append((kind, codes, *rest))
 
     def starts(self):
         return None
-
-    def run(self, records):
-        lists = [record[0] for record in records if isinstance(record, list)]
-        need(set(lists) <= {"x", "s", "c", "t", "b", "m", "o", "i"}, "a record that such a graph cannot have")
-        return super().run(records)
 
     def forms_of(self, ends, loads, F_hi, F_lo):
         data = self.data

@@ -9,7 +9,7 @@ from itertools import islice, product
 
 from flint import fmpq, fmpq_mat, fmpq_poly
 from rational_forms import Forms, Refused, _value, exact, need
-from rational_references import FINAL, SPLITS, Reference
+from rational_references import FINAL, Reference
 from rational_zeros import cells, interpolated, one_sign
 
 #: Alphas of a piece at which all selections are tried, as shares of its length.
@@ -27,7 +27,7 @@ def nowhere_negative(f, x, y):
 
 
 class ClosedPiece:
-    """A record "m" of the piece [x, y]."""
+    """A form of arcs over the piece [x, y], and the leaves that refer to it: kind, codes, and what else they say."""
 
     def __init__(self, data, x, y, mu, kappa, nu):
         self.data, self.x, self.y, self.p = data, x, y, data.p
@@ -38,6 +38,7 @@ class ClosedPiece:
         for F in ends:
             need(all(abs(n) * f <= m for n, f, m in zip(self.nu, F, self.mu, strict=True)), "nu is too large")
         self.rubbing = [i for i, pair in enumerate(zip(*ends, strict=True)) if max(pair) > 0]
+        self.leaves = []
 
     def check(self, traces, pairs, origin):
         """Whether all its solutions lie on the arcs of some traces; pairs are partners among their events."""
@@ -105,24 +106,20 @@ class ClosedPiece:
 
 
 class FloatingPiece(ClosedPiece):
-    """A record "m" of a body that nothing holds, with its leaves o and i.
+    """The same of a body that nothing holds, with leaves o and i.
 
     The forms of its leaves are tested at some alphas, with the root that the arcs have there.
     """
 
-    def __init__(self, data, x, y, mu, kappa, nu, more, leaves):
+    def __init__(self, data, x, y, mu, kappa, nu, more):
         super().__init__(data, x, y, mu, kappa, nu)
         need(len(more) == 3 and exact(more[2]) in range(1, 33), "a form has another size, or no degree")
-        self.balance, self.share, self.leaves = more[0], more[1], leaves
-        for kind, _, first, *_ in leaves:
-            need(kind != "o" or first == 1, "a form was not declared")
+        self.balance, self.share = more[0], more[1]
 
     def check(self, traces, pairs, origin):
         found = self._led(traces, pairs)
         led = [selection.codes for selection, *_ in found]
         final = [FINAL[i in self.rubbing] for i in range(self.p)]
-        for selection in product(*final):
-            need(any(self._below(selection, codes) for _, codes, *_ in self.leaves), "a selection is in no leaf")
         for kind, codes, *rest in self.leaves:
             if kind == "i":
                 forms = (self.data.forms(alpha) for alpha in (self.x, self.y))
@@ -157,10 +154,6 @@ class FloatingPiece(ClosedPiece):
                     reference.check(codes, *rest[1:])
             return
         need(False, "no theta serves a solution")
-
-    @staticmethod
-    def _below(selection, codes):
-        return all(own == code or own in SPLITS.get(code, ()) for own, code in zip(selection, codes, strict=True))
 
 
 class _Along:

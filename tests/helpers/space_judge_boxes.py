@@ -317,7 +317,7 @@ class NaturalMap:
         return Around(z, self.Z, moved, spread)
 
     def bordered(self, around, e, statuses=None):
-        """Over balls of (z, alpha): Y near an inverse of B, E, G and V of (12.13), B and terms Y D Z."""
+        """Over balls of (z, alpha): Y near an inverse of B, E, G and V of (12.14), B and terms Y D Z."""
         rows, U, V, terms = self.equations(around, e, statuses)
         middle = arb_mat(rows)
         for u, v in zip(U, V, strict=True):

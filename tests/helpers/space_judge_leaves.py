@@ -149,7 +149,7 @@ class View:
         self.system, self.codes = leaf.system, leaf.codes
         step = alpha - leaf.alpha
         forces = leaf.along(angles, alpha)
-        #: D of (12.3a): by how much the tangential forces of a unit normal force differ from those in the middle
+        #: D of (12.4): by how much the tangential forces of a unit normal force differ from those in the middle
         self.D = [[x - y for x, y in zip(a, b, strict=True)] for a, b in zip(forces, leaf.forces, strict=True)]
         self.K = (
             arb_mat(
@@ -183,7 +183,7 @@ class View:
         return row[start : start + len(tau[self.leaf.sliding[j]])]
 
     def moves(self, change, free):
-        """(12.3b) Derivatives of y and w where D of the sliding nodes changes so, and x without it by free."""
+        """(12.5) Derivatives of y and w where D of the sliding nodes changes so, and x without it by free."""
         leaf = self.leaf
         pushed = [[c * x for c in part] for part, x in zip(change, self.xc, strict=True)]
         flat = [value for part in pushed for value in part]

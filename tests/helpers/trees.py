@@ -8,7 +8,7 @@ from enumsol.branches.enclosed.single_branches import ClosedPieces
 from enumsol.search import fathoming as closing
 from enumsol.search.fathoming import Closer
 from enumsol.search.reduction import WeightSource
-from enumsol.search.space import space_setup
+from enumsol.search.space import space_search
 from enumsol.search.space.open_leaves import KnownBoxes
 from enumsol.search.space.space_fathoming import SpaceCloser
 
@@ -70,4 +70,4 @@ def above_known_roots():
 
 def forms_at_once():
     """In this context searches in 3D look for a form after one node, and use the best one that there is."""
-    return _with((space_setup, "NODES", 1), (space_setup, "_SHARE", 1.0))
+    return _with((space_search, "NODES", 1), (space_search, "_SHARE", 1.0))

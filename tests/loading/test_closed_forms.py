@@ -56,7 +56,7 @@ def test_the_loop_closes_and_dissipates_its_area():
 def test_below_the_bound_the_node_shakes_down():
     history = histories(pressed_node(4.0), [1.5, 0.0, 1.25, 0.0, 1.25])
     assert [history.root((step, 0)).statuses[0].value for step in range(1, 6)] == ["slip+", *["stick"] * 4]
-    radii = [stage.largest_radius for stage in history.data.stages]
+    radii = [stage.largest_radius for stage in history.all_stages]
     assert len(set(radii[1:])) == 1  # carried over, never computed again
 
 
@@ -130,4 +130,4 @@ def test_loops_are_those_of_the_theorem(pad):
         root = history.root((step, 0))
         assert root.lambda_n == pytest.approx(full, abs=1e-12)
         assert root.lambda_t == pytest.approx(forces, abs=1e-12)
-    assert max(stage.largest_radius for stage in history.data.stages) < 1e-11
+    assert max(stage.largest_radius for stage in history.all_stages) < 1e-11

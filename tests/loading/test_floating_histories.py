@@ -90,7 +90,7 @@ def test_random_bodies_in_balls_against_rationals_step_by_step(seed):
 def test_such_histories_are_complete_slide_and_have_none_and_several_roots():
     count, first = some(20, of=60), some(82, of=60)
     found = [agreed(*case(seed)) for seed in range(first, first + count)]
-    slid = [history for history in found if any(stage.start.radius is not None for stage in history.data.stages)]
+    slid = [history for history in found if any(stage.start.radius is not None for stage in history.all_stages)]
     assert sum(history.complete for history in slid) > count // 3
     assert sum(history.counts[-1] == 0 for history in found if history.complete) > count // 30
     assert sum(bool(history.branchings) for history in found) > 0
@@ -109,12 +109,12 @@ def test_what_has_slid_stays_where_it_is_to_the_last_bit():
     problem = pushed_block(2)
     history = proven(problem, [0.5, 0.9, 0.0, -0.1, 0.8, 0.3])
     assert (history.complete, history.unique_until) == (True, 6)
-    starts = [stage.start for stage in history.data.stages]
+    starts = [stage.start for stage in history.all_stages]
     # nothing slips in steps 3 to 6
     assert {start.key for start in starts[3:]} == {starts[2].key}
     assert starts[2].radius is not None
     exact = enumsol.histories(problem, [0.5, 0.9, 0.0, -0.1, 0.8, 0.3], arithmetic="exact")
-    for one, other in zip(history.data.stages, exact.data.stages, strict=True):
+    for one, other in zip(history.all_stages, exact.all_stages, strict=True):
         pairs = zip(other.start.rationals, one.start.ball.low, one.start.ball.high, strict=True)
         assert all(Fraction(low) <= value <= Fraction(high) for value, low, high in pairs)
 
@@ -125,10 +125,10 @@ def test_the_ball_of_a_start_does_not_grow_with_the_steps():
     alphas = np.round(rng.uniform(-0.97, 0.97, 40), 3).tolist()
     history = proven(pushed_block(3), alphas)
     assert (history.complete, history.unique_until) == (True, 40)
-    assert len({stage.start.key for stage in history.data.stages}) > 5
-    slid = np.max(np.abs(history.data.stages[-1].start.offset))
+    assert len({stage.start.key for stage in history.all_stages}) > 5
+    slid = np.max(np.abs(history.all_stages[-1].start.offset))
     # rounding of some numbers near one, by which stiffnesses are multiplied
-    assert history.data.stages[-1].largest_radius < 1e-10 * slid
+    assert history.all_stages[-1].largest_radius < 1e-10 * slid
 
 
 @pytest.mark.parametrize("arithmetic", ["verified", "exact"])
@@ -159,7 +159,7 @@ def test_a_body_held_where_the_supports_bear_nothing_does_the_same():
     history = proven(problem, [0.5, 0.9, -0.4, -0.95, 0.7])
     assert history.complete
     A, Bn, Bt = (part.toarray() for part in (problem.A, problem.Bn, problem.Bt))
-    for stage in history.data.stages:
+    for stage in history.all_stages:
         (root,) = stage.roots
         u = root.u[held]
         f = problem.load_at(root.alpha)[rest] - A[np.ix_(rest, held)] @ u
@@ -180,7 +180,7 @@ def test_options_are_those_of_bodies_that_are_held(tmp_path):
     joined = enumsol.histories(problem, [0.5, 0.9, 0.2], merge=1e-3, follow="nearest")
     assert joined.complete
     again = read_back(joined, tmp_path / "h.json", problem)
-    for one, other in zip(again.data.stages, joined.data.stages, strict=True):
+    for one, other in zip(again.all_stages, joined.all_stages, strict=True):
         for a, b in zip(one.roots, other.roots, strict=True):
             assert_same(a, b, "lambda_t", "rigid_coordinates", "u", "enclosure.rigid_coordinates")
     stop = CtrlC(lambda state: state.step == 2)
@@ -204,9 +204,9 @@ def test_the_least_of_the_bounds_that_were_needed_is_named():
     history = enumsol.histories(pushed_block(1), [0.5, 0.9, 0.0])
     stages = [
         SimpleNamespace(**vars(stage) | {"roots": SimpleNamespace(rigid_bound=bound, unique=True, proof=None)})
-        for stage, bound in zip(history.data.stages, bounds, strict=True)
+        for stage, bound in zip(history.all_stages, bounds, strict=True)
     ]
-    data = dataclasses.replace(history.data, stages=tuple(stages))
+    data = dataclasses.replace(history, all_stages=tuple(stages))
     assert data._within() == ", within rigid displacements of 2"
 
 
@@ -319,7 +319,7 @@ def test_a_load_that_is_held_or_reached_again_is_decided_in_balls(cells, alphas)
     history, exact = proven(problem, alphas), enumsol.histories(problem, alphas, arithmetic="exact")
     assert (history.complete, history.unique_until) == (True, len(alphas))
     shared = 0
-    for stage, other in zip(history.data.stages, exact.data.stages, strict=True):
+    for stage, other in zip(history.all_stages, exact.all_stages, strict=True):
         (root,), (known,) = stage.roots, other.roots
         assert (root.index, root.regular, root.active) == (known.index, known.regular, known.active)
         shared += not root.regular
@@ -327,7 +327,7 @@ def test_a_load_that_is_held_or_reached_again_is_decided_in_balls(cells, alphas)
         pairs = zip(other.start.rationals, stage.start.ball.low, stage.start.ball.high, strict=True)
         assert all(Fraction(low) <= value <= Fraction(high) for value, low, high in pairs)
     assert shared
-    assert history.data.stages[-1].largest_radius < 1e-13
+    assert history.all_stages[-1].largest_radius < 1e-13
 
 
 def test_other_limits_are_counted_in_the_same_way(tmp_path):

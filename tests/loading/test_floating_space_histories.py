@@ -49,7 +49,7 @@ def test_friction_along_one_axis_is_that_of_the_plane(seed):
     plane = enumsol.histories(in_the_plane(known.problem), loads, arithmetic="exact")
     assert complete_report(known.problem, space.proof).unique_until == space.unique_until == plane.unique_until
     assert space.counts == plane.counts
-    for stage in space.data.stages:
+    for stage in space.all_stages:
         low, high = (part.reshape(2, -1)[0] for part in (stage.start.ball.low, stage.start.ball.high))
         exact = [other.start.rationals for other in plane.stages(stage.step)]
         balls = [zip(low, start, high, strict=True) for start in exact]
@@ -64,7 +64,7 @@ def newton_misses(seed, count=20):
     known, rng, found, missed = known_body(seed), np.random.default_rng(seed), 0, []
     problem = known.problem
     history = enumsol.histories(problem, loads_near(known, rng, 3))
-    for stage in history.data.stages:
+    for stage in history.all_stages:
         for _ in range(count):
             forces = rng.uniform(0, 2, problem.p), rng.normal(size=2 * problem.p)
             start = np.concatenate([*forces, 3 * rng.normal(size=problem.modes.r)])
@@ -109,7 +109,7 @@ def test_a_block_is_pushed_to_and_fro_and_then_away(tmp_path):
     report = complete_report(block, history.proof)
     assert report.unique_until == 3
     assert report.within is None or f"rigid displacements of {report.within:g}" in history.closing_line
-    radii = [stage.largest_radius for stage in history.data.stages]
+    radii = [stage.largest_radius for stage in history.all_stages]
     assert 0 < radii[-1] < 1e-9
     again = read_back(history, tmp_path / "h.json", block)
     assert repr(again) == repr(history)

@@ -37,7 +37,7 @@ def test_the_wedge_ends_jammed_or_free_by_the_branch_alone(out_again):
 
 def test_every_step_is_what_enumerate_roots_finds(out_again, pulled_wedge):
     """Starts without a radius are ordinary problems: by hand, with problems built anew."""
-    for stage in out_again.data.stages:
+    for stage in out_again.all_stages:
         alpha = float(stage.roots.alpha)
         by_hand = anew(pulled_wedge, slip_offset=stage.start.offset)
         roots = enumerate_roots(by_hand, alpha)
@@ -116,7 +116,7 @@ def test_a_continuum_is_listed_and_not_followed(arithmetic, tmp_path):
     assert (history.counts, history.complete, history.unique_until) == ((0, 0), False, 0)
     assert "none reaches the last step" in repr(history)
     again = read_back(history, tmp_path / "h.json", history.problem)
-    (one,), (other,) = (h.data.stages[0].roots.families for h in (history, again))
+    (one,), (other,) = (h.all_stages[0].roots.families for h in (history, again))
     assert_same(one, other, "alpha", "index", "vertices_proven", "dimension", "vertices")
     assert [part.statuses for part in one.polytopes] == [part.statuses for part in other.polytopes]
     for node in ((1, 5), "1.0", (0, 0)):
@@ -337,7 +337,7 @@ def test_a_history_is_read_back_to_the_last_bit(arithmetic, tmp_path):
     assert repr(again) == repr(history)
     assert again.to_frame().equals(history.to_frame())
     assert again.refinement == history.refinement
-    for one, other in zip(again.data.stages, history.data.stages, strict=True):
+    for one, other in zip(again.all_stages, history.all_stages, strict=True):
         assert_same(one, other, "start.key", "roots.alpha")
         for a, b in zip(one.roots, other.roots, strict=True):
             assert_same(a, b, "lambda_t", "exact_slips", "u")

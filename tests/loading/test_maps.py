@@ -12,7 +12,7 @@ from refusals import bad_argument, refusal
 
 import enumsol
 from enumsol import MultiplicityMap, enumerate_roots, multiplicity_map
-from enumsol.loading.maps import _Replaced
+from enumsol.loading.maps import _replaced
 
 SQUARE = enumsol.gallery.two_node_square()
 
@@ -45,7 +45,7 @@ def test_problems_of_a_map_share_their_factors_and_their_data_are_those_replaced
         block.A, block.Bn, block.Bt, block.f, friction=0.1, friction_slope=1.0, load_slope=-block.f
     )
     for name, value in (("friction", 0.5), ("gap", 1e-3), ("load", 0.25)):
-        made = _Replaced(block, name, np.arange(block.n, dtype=float))(value)
+        made = _replaced(block, name, np.arange(block.n, dtype=float), value)
         data = {"f": block.f + value * np.arange(block.n)} if name == "load" else {name: value}
         data |= {"friction_slope": 0.0} if name == "friction" else {}
         again = enumsol.ContactProblem(

@@ -41,7 +41,7 @@ def test_those_that_run_away_are_not_followed(triangle):
     history = enumsol.histories(triangle, [5, 4], follow="not running away")
     away = [node for node, found in history.verdicts.items() if found.verdict == AWAY]
     first = [node for node in away if node[0] == 1]
-    assert [node in history.data.followed for node in history.nodes_of(1)] == [
+    assert [node in history.followed for node in history.nodes_of(1)] == [
         node not in first for node in history.nodes_of(1)
     ]
     assert history.reasons == tuple(f"step 1: root {a}.{b} is not followed, it runs away" for a, b in first)
@@ -52,7 +52,7 @@ def test_those_that_run_away_are_not_followed(triangle):
 
 def test_undecided_ends_are_kept_and_told(triangle):
     history = enumsol.histories(triangle, [5, 4], arithmetic="fast", follow="not running away")
-    assert set(history.nodes_of(1)) == history.data.followed
+    assert set(history.nodes_of(1)) == history.followed
     text = repr(history)
     assert "0, 3 undecided" in text
     assert "1.0 open (running away undecided)" in text

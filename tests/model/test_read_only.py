@@ -192,7 +192,7 @@ def test_what_flint_computes_with_cannot_be_written():
     matrix[0, 0] = 77
     assert graph.exact.S[0, 0] != 77
     assert [root.lambda_n.tolist() for root in graph.roots_at(3.5)] == [root.lambda_n.tolist() for root in before]
-    for rows in (graph.exact.rows, graph.exact.integers.S):
+    for rows in (graph.exact.rows, graph.exact.integers.rows):
         with pytest.raises(TypeError, match="does not support item assignment"):
             rows[0][0] = 77
 

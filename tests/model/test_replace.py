@@ -12,8 +12,8 @@ from refusals import bad_problem
 
 import enumsol
 from enumsol import ContactProblem, ContactProblem3D, FrictionTable, gallery
+from enumsol.condensation.enclosure import Products
 from enumsol.condensation.factorization import Factorization
-from enumsol.condensation.products import Products
 from enumsol.model.restart import SlipStart, restarted
 
 

@@ -8,10 +8,9 @@ import pytest
 from proof_tools import bytes_of
 
 from enumsol import Proof, enumerate_roots, gallery
-from enumsol.proof.begun import BegunProof
 from enumsol.proof.proof_file import MAGIC
-from enumsol.proof.writer import BEGIN, FLUSH_EVERY, Checksum, Part, ProofWriter, encoded
-from enumsol.search import parallel
+from enumsol.proof.writer import BEGIN, FLUSH_EVERY, BegunProof, Checksum, Part, ProofWriter, encoded
+from enumsol.search import setup
 
 
 def text_of(data):
@@ -82,7 +81,7 @@ def test_what_is_not_finite_is_no_record():
 
 
 def test_what_workers_have_compressed_is_in_the_proof_byte_by_byte(monkeypatch):
-    monkeypatch.setattr(parallel, "NODES", 64)
+    monkeypatch.setattr(setup, "NODES", 64)
     entry = gallery.get("wedge-14-5")
     answers = []
 

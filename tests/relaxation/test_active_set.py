@@ -10,8 +10,15 @@ from enumsol import gallery
 from enumsol.condensation.condensed import CondensedSystem
 from enumsol.model.statuses import CONTACT, FRICTIONLESS, OPEN, SLIP_MINUS, SLIP_PLUS, STICK, UNDECIDED
 from enumsol.relaxation.active_set import ActiveSetEngine
-from enumsol.relaxation.engine import FEASIBILITY_TOLERANCE, PRUNE_MARGIN
-from enumsol.relaxation.imposed_rows import EQUALITY, INEQUALITY, imposed_rows, row_normals, status_rows
+from enumsol.relaxation.engine import (
+    EQUALITY,
+    FEASIBILITY_TOLERANCE,
+    INEQUALITY,
+    PRUNE_MARGIN,
+    imposed_rows,
+    row_normals,
+    status_rows,
+)
 from enumsol.relaxation.interior_point import InteriorPointEngine
 
 

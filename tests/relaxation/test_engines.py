@@ -18,8 +18,7 @@ from generators import named, random_problem, singular_problem
 import enumsol
 from enumsol import MissingDependencyError, enumerate_roots, gallery
 from enumsol.relaxation import active_set, interior_point as fallback
-from enumsol.search.certifiers.float_certifier import FastCertifier
-from enumsol.search.solvers import plane_search
+from enumsol.search.solvers import FastCertifier, plane_search
 from enumsol.selections.float_selections import FloatSelections
 
 

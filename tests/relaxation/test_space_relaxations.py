@@ -12,7 +12,7 @@ from enumsol.model.statuses import CONTACT, UNDECIDED
 from enumsol.relaxation.convex_forms import SlipFormAscent
 from enumsol.relaxation.engine import PRUNE_MARGIN
 from enumsol.relaxation.space_relaxation import SpaceEngine
-from enumsol.search.space.space_setup import SpaceSolvers
+from enumsol.search.space.space_search import SpaceSolvers
 from enumsol.trusted.space.sector_margins import space_margin
 
 

@@ -17,9 +17,9 @@ import enumsol
 from enumsol import MissingDependencyError, branch_graph, enumerate_roots, fem, gallery, histories, write_report
 from enumsol.model.cells import boundary_facets
 from enumsol.model.shapes import body_shape
-from enumsol.report import graph_page as content, history_page, parts as bodies
-from enumsol.report.graph_page import rounded_list, slider_alphas
-from enumsol.report.parts import body_record
+from enumsol.report import graph_page as content, parts as bodies, roots_page
+from enumsol.report.graph_page import slider_alphas
+from enumsol.report.parts import body_record, short_list
 from enumsol.support.plotting import new_figure
 
 pytest.importorskip("plotly")
@@ -159,8 +159,8 @@ def test_a_graph_of_many_arcs_is_drawn_more_coarsely(wedge, monkeypatch):
 
 
 def test_numbers_are_short_and_finite():
-    assert rounded_list([1 / 3, 2.0, -0.0, 1e20]) == [0.333333333, 2, 0, 1e20]
-    assert json.dumps(rounded_list(np.eye(2))) == "[[1, 0], [0, 1]]"
+    assert short_list([1 / 3, 2.0, -0.0, 1e20], 9) == [0.333333333, 2, 0, 1e20]
+    assert json.dumps(short_list(np.eye(2), 9)) == "[[1, 0], [0, 1]]"
 
 
 def test_words_and_tables(wedge, wedge_page):
@@ -419,7 +419,7 @@ def test_no_outline_is_as_wide_as_a_body_is_long():
 
 def test_pictures_are_within_the_page():
     figure = new_figure(figsize=(2, 1))
-    text = history_page._image(figure, "u < v")
+    text = roots_page._image(figure, "u < v")
     found = re.fullmatch(r'<figure><img src="data:image/png;base64,(.+)" alt="u &lt; v"></figure>', text)
     data = base64.b64decode(found[1], validate=True)
     assert data.startswith(b"\x89PNG")
@@ -428,7 +428,7 @@ def test_pictures_are_within_the_page():
 
 def test_an_incomplete_history_says_so(tmp_path, monkeypatch):
     """Of three roots of the second step one is followed."""
-    monkeypatch.setattr(history_page, "_image", lambda _, words: f"<p>Picture of {words}.</p>")
+    monkeypatch.setattr(roots_page, "_image", lambda _, words: f"<p>Picture of {words}.</p>")
     problem = gallery.one_node_triangle()
     history = histories(problem, [5, 4], follow="nearest")
     text = text_of(page_of(history, tmp_path, units=("N", "mm")))

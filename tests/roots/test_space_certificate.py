@@ -25,8 +25,8 @@ from trees import by_the_tree
 from enumsol import ContactStatus, enumerate_roots, gallery, verify
 from enumsol.model.statuses import UNDECIDED
 from enumsol.search.space.space_fathoming import SpaceCloser
-from enumsol.search.space.space_setup import SpaceSolvers
-from enumsol.trusted.space.space_uniqueness import is_complete, only_root, only_solution_in_space
+from enumsol.search.space.space_search import SpaceSolvers
+from enumsol.trusted.space.space_uniqueness import is_complete, lone_root, only_solution_in_space
 
 
 def closed(problem, alpha=0):
@@ -270,7 +270,8 @@ def test_no_numbers_close_a_problem_with_several_roots(name):
             theta = served(root, F) * rng.choice([1.0, 1.0, 0.5, 0.0], (system.p, 1))
             numbers = np.concatenate([mu, kappa, np.zeros(system.p), nu[places], theta[places]])
             assert only_solution_in_space(solvers.enclosed, numbers, root.lambda_n / system.force) is None
-            assert all(only_root(solvers.enclosed, numbers, codes) is None for codes in leaves)
+            whole = (UNDECIDED,) * system.p
+            assert all(lone_root(solvers.enclosed, whole, numbers, codes) is None for codes in leaves)
 
 
 def leaf_codes(solvers):

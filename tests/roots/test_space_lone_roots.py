@@ -13,7 +13,7 @@ from trees import by_the_tree, closed_in_the_tree
 from enumsol import enumerate_roots, verify
 from enumsol.model.sectors import SECTORS
 from enumsol.model.statuses import CONTACT, OPEN, STICK, UNDECIDED
-from enumsol.search.space.space_setup import SpaceSolvers
+from enumsol.search.space.space_search import SpaceSolvers
 from enumsol.trusted.space.space_uniqueness import equations, lone_root
 
 

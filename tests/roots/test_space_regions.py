@@ -18,7 +18,7 @@ from enumsol.cli import roots as command
 from enumsol.model.sectors import SECTORS
 from enumsol.roots.space_roots import _hull, regions_of
 from enumsol.search.space.open_leaves import Cause
-from enumsol.search.space.space_setup import SpaceSolvers
+from enumsol.search.space.space_search import SpaceSolvers
 
 pytestmark = pytest.mark.usefixtures("tree_only", "no_boxes")
 LOADED = (np.eye(3), [1, 3, 2])

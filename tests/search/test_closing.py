@@ -218,8 +218,8 @@ def test_fast_arithmetic():
 def test_sides_are_told_to_workers(workers, monkeypatch):
     problem = row_of_discs(12, weights=(2.0, 3.0), friction=0.9)
     alone = enumerate_roots(problem, 0)
-    monkeypatch.setattr("enumsol.search.parallel.FIRST", 8)
-    monkeypatch.setattr("enumsol.search.parallel.NODES", 16)
+    monkeypatch.setattr("enumsol.search.setup.FIRST", 8)
+    monkeypatch.setattr("enumsol.search.setup.NODES", 16)
     with ThreadPoolExecutor(workers) as executor:
         together = all_roots(problem, 0, executor=executor, max_nodes=600)
     assert actives(together) == actives(alone)

@@ -21,7 +21,7 @@ from enumsol.branches.enclosed.tracing import _Tracing
 from enumsol.branches.known_selections import KnownSelections
 from enumsol.condensation.factorization import Factorization
 from enumsol.relaxation.convex_forms import FormAscent
-from enumsol.search import form_policy as forms
+from enumsol.search import nodes as forms
 from enumsol.search.solvers import Solvers
 from enumsol.search.space.space_fathoming import DefiniteForm
 from enumsol.search.subintervals import IntervalSearch
@@ -207,7 +207,7 @@ def test_what_was_not_joined_in_time_is_listed(clock, takes):
 
 
 def test_a_form_is_not_sought_beyond_the_limit(clock, takes, tree_only, monkeypatch):
-    monkeypatch.setattr(forms, "NODES", 0)
+    monkeypatch.setattr(forms, "FORM_AFTER", 0)
     takes(FormAscent, "_candidate")
     problem = gallery.clamped_block(12, 6)
     accepted_report(problem, cut(clock, enumerate_roots, problem, 0.3, time_limit=4.0).proof)

@@ -17,10 +17,10 @@ from rational_forms import Data, Forms, _value, exact
 
 from enumsol import enumerate_roots, gallery, verify
 from enumsol.condensation.enclosure import CondensedEnclosure, EnclosedSystem
-from enumsol.search import form_policy as policy
+from enumsol.search import nodes as policy
 from enumsol.search.solvers import Solvers
 from enumsol.trusted.exclusion import exclusion_margin
-from enumsol.trusted.quadratic_forms import EnclosedForm, Equations
+from enumsol.trusted.quadratic_forms import EnclosedForm, equations_of
 from enumsol.trusted.status_rows import row_signs
 
 pytestmark = pytest.mark.usefixtures("tree_only")
@@ -29,7 +29,7 @@ pytestmark = pytest.mark.usefixtures("tree_only")
 @pytest.fixture
 def eager(monkeypatch):
     """A form from the first node on, whether it pays or not."""
-    monkeypatch.setattr(policy, "NODES", 0)
+    monkeypatch.setattr(policy, "FORM_AFTER", 0)
     monkeypatch.setattr(policy, "MORE", -2.0)
 
 
@@ -51,7 +51,7 @@ def test_the_roots_are_the_same(eager, monkeypatch):
         found = enumerate_roots(problem, 1.0)
         used += len(by_forms(records_of(found.proof)))
         with monkeypatch.context() as patch:
-            patch.setattr(policy, "NODES", 10**9)
+            patch.setattr(policy, "FORM_AFTER", 10**9)
             plain = enumerate_roots(problem, 1.0)
         assert [root.statuses for root in found] == [root.statuses for root in plain], seed
         assert found.complete == plain.complete
@@ -64,7 +64,7 @@ def test_the_roots_are_the_same(eager, monkeypatch):
 def test_a_long_search_is_shorter_with_forms(monkeypatch):
     problem = gallery.clamped_block(32, 16)
     plain = enumerate_roots(problem, 0.3)
-    monkeypatch.setattr(policy, "NODES", 100)
+    monkeypatch.setattr(policy, "FORM_AFTER", 100)
     found = proven_roots(problem, 0.3)
     assert len(by_forms(records_of(found.proof))) > 20
     assert found.stats.nodes < 0.7 * plain.stats.nodes
@@ -73,13 +73,13 @@ def test_a_long_search_is_shorter_with_forms(monkeypatch):
 
 def test_a_good_form_leaves_little_more_than_one_path(monkeypatch):
     # open or in contact, then stick or slip: five nodes of the tree a contact node, if every one is branched on once
-    monkeypatch.setattr(policy, "NODES", 0)
+    monkeypatch.setattr(policy, "FORM_AFTER", 0)
     assert all_roots(gallery.clamped_block(32, 16), 0.3).stats.nodes <= 6 * 32
 
 
 def test_wedges_go_on_with_the_energy(monkeypatch):
     plain = enumerate_roots(*named("wedge-8-5"))
-    monkeypatch.setattr(policy, "NODES", 100)
+    monkeypatch.setattr(policy, "FORM_AFTER", 100)
     found = enumerate_roots(*named("wedge-8-5"))
     assert records_of(found.proof) == records_of(plain.proof)
 
@@ -126,12 +126,12 @@ def test_enclosed_forms_hold_the_exact_ones(seed):
     # with equations: the same wherever they hold, more elsewhere
     weight = float(rng.uniform(0.1, 10.0))
     heavy = EnclosedForm.of(system, codes, multipliers, weight)
-    rows = Equations.of(system, codes)
-    factor = weight / np.maximum(np.einsum("ij,ij->i", rows.a, rows.a), 1e-300)
+    a, b = equations_of(system, codes)
+    factor = weight / np.maximum(np.einsum("ij,ij->i", a.mid, a.mid), 1e-300)
     kinds = {0: (0, 1), 1: (4, 5), 2: (4, 2), 3: (4, 3), 5: (4,), 6: ()}
     given = [forms.row(kind, i) for i, code in enumerate(codes) for kind in kinds[code]]
-    assert len(given) == len(rows.b)
-    order = _matching(given, rows)
+    assert len(given) == len(b.mid)
+    order = _matching(given, a.mid, b.mid)
 
     def weighted(i, j):
         return sum((_exact(factor[k]) * given[m][i] * given[m][j] for m, k in order), fmpq(0))
@@ -146,10 +146,10 @@ def _exact(value):
     return fmpq(*float(value).as_integer_ratio())
 
 
-def _matching(given, rows):
+def _matching(given, rows, loads):
     """Which exact equation each of the enclosed ones is, up to sign."""
     found = []
-    for k, (a, b) in enumerate(zip(rows.a, rows.b, strict=True)):
+    for k, (a, b) in enumerate(zip(rows, loads, strict=True)):
         ours = np.append(a, -b)
         for m, form in enumerate(given):
             theirs = np.array([float(int(x.p)) / float(int(x.q)) for x in form])
@@ -310,14 +310,14 @@ def _row(kind, i, S, g, F):
 
 def test_a_search_that_is_stopped_after_it_began_again_claims_what_it_has(monkeypatch):
     problem = gallery.clamped_block(32, 16)
-    monkeypatch.setattr(policy, "NODES", 100)
+    monkeypatch.setattr(policy, "FORM_AFTER", 100)
     cut = enumerate_roots(problem, 0.3, max_nodes=100)
     assert (cut.complete, accepted_report(problem, cut.proof).complete) == (False, False)
 
 
 def test_workers_make_the_same_proof(monkeypatch):
     problem = gallery.clamped_block(32, 16)
-    monkeypatch.setattr(policy, "NODES", 100)
+    monkeypatch.setattr(policy, "FORM_AFTER", 100)
     monkeypatch.setattr(policy, "MORE", -2.0)
     with ThreadPoolExecutor(1) as alone, ThreadPoolExecutor(2) as two:
         one, other = (enumerate_roots(problem, 0.3, executor=executor) for executor in (alone, two))

@@ -10,13 +10,13 @@ from generators import through_the_unloaded_state
 from graph_proofs import forms_at_once, refused, without_arcs
 from oracles import exact_solutions
 from path_problems import generic_problem
-from proof_tools import of_kind, proof_of, records_of, replaced
+from proof_tools import by_forms, of_kind, proof_of, records_of, replaced
 from rational_checker import check_records
 
 from enumsol import branch_graph, gallery, verify
 from enumsol.relaxation.active_set import ActiveSetEngine, IntervalSystem, PieceForm
 from enumsol.search import interval_tree
-from enumsol.search.form_policy import PairedTerms, better_form
+from enumsol.search.nodes import PairedTerms, better_form
 from enumsol.trusted.exclusion import exclusion_margin
 from enumsol.trusted.over_interval import EnclosedPiece
 
@@ -35,7 +35,7 @@ def shape(graph):
 @pytest.mark.few(2)
 @pytest.mark.parametrize("kind", KINDS)
 def test_graphs_and_both_checkers_agree(kind):
-    by_forms = 0
+    forms = 0
     for seed in range(8):
         rng = np.random.default_rng(seed)
         problem = generic_problem(rng, int(rng.integers(1, 4)), kind)
@@ -46,15 +46,15 @@ def test_graphs_and_both_checkers_agree(kind):
         report = complete_report(problem, graph.proof)
         if problem.p < 3:
             assert check_records(problem, without_arcs(records)) == report.selections
-        by_forms += len(of_kind(records, "f"))
-    assert by_forms > 10
+        forms += len(by_forms(records))
+    assert forms > 10
 
 
 def test_beside_the_unloaded_state():
     problem, interval = through_the_unloaded_state()
     graph = with_forms(problem, interval)
     records = records_of(graph.proof)
-    assert of_kind(records, "f")
+    assert by_forms(records)
     assert check_records(problem, records) == verify(problem, graph.proof).selections
 
 
@@ -119,8 +119,11 @@ def test_forms_that_make_no_sense_are_refused():
     records = without_arcs(records_of(with_forms(problem, (0.5, 4.0)).proof))
     (k, *_) = of_kind(records, "q")
     form = records[k]
-    others = [["q", mu, *form[2:]] for mu in (None, ["x", 1.0], [1e308] * 2, [0.0] * 2, [-1.0] * 2)]
-    others += [form[:4], [*form, 0.0], [*form[:3], [-1.0, 0.5], form[4]], [*form[:4], form[4][:1]]]
+    codes, numbers = form[1], form[2]
+    others = [["q", codes, [*mu, *numbers[2:]], []] for mu in (["x", 1.0], [1e308] * 2, [0.0] * 2, [-1.0] * 2)]
+    others += [["q", codes, None, []], form[:3], [*form, 0.0], ["q", codes, numbers, [0.0]], ["q", [6], numbers, []]]
+    others += [["q", [6, 5], numbers, []], ["q", [], numbers, []], ["q", codes, numbers[:7], []]]
+    others += [["q", codes, [*numbers[:4], -1.0, *numbers[5:]], []]]
     for changed in others:
         assert refused(problem, replaced(records, k, changed))
     assert not verify(problem, proof_of(replaced(records, k))).ok

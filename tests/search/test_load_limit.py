@@ -10,7 +10,7 @@ from helpers.floating_oracle import Oracle, block_on_table, random_body, rationa
 from scipy.spatial.transform import Rotation
 
 import enumsol
-from enumsol.search.load_limit import LIMIT_TOLERANCE, load_limit
+from enumsol.search.setup import LIMIT_TOLERANCE, load_limit
 
 NAMED = "the load is at the limit of what contact can hold"
 
@@ -93,7 +93,7 @@ def test_a_search_without_hope_ends(workers):
 
 @pytest.mark.parametrize("space", [False, True])
 def test_a_search_that_might_not_end_does(space, monkeypatch):
-    monkeypatch.setattr("enumsol.search.tree._AT_LIMIT", 240 if space else 30)
+    monkeypatch.setattr("enumsol.search.setup._AT_LIMIT", 240 if space else 30)
     flat = block_on_table(cells=20, push=1.0)
     problem = enumsol.gallery.block_on_table3d(2, push=(0.6, 0.8)) if space else flat
     roots = enumsol.enumerate_roots(problem, 0)

@@ -10,9 +10,9 @@ from generators import named, random_problem
 from proof_tools import bytes_of
 
 from enumsol import enumerate_roots
-from enumsol.search import form_policy, lookahead, parallel
+from enumsol.search import nodes, setup
 
-LOOKING = lookahead.Lookahead._best
+LOOKING = nodes.Lookahead._best
 
 
 @pytest.fixture
@@ -24,16 +24,16 @@ def soon(monkeypatch):
         chosen.append(LOOKING(self, codes, relaxation))
         return chosen[-1]
 
-    monkeypatch.setattr(form_policy, "NODES", 100)
-    monkeypatch.setattr(lookahead, "NODES", 100)
-    monkeypatch.setattr(lookahead, "_DEPTHS", ((1.0, 6),))
-    monkeypatch.setattr(lookahead.Lookahead, "_best", counted)
+    monkeypatch.setattr(nodes, "FORM_AFTER", 100)
+    monkeypatch.setattr(nodes, "NODES", 100)
+    monkeypatch.setattr(nodes, "_DEPTHS", ((1.0, 6),))
+    monkeypatch.setattr(nodes.Lookahead, "_best", counted)
     return chosen
 
 
 def test_random_problems_have_the_roots_of_all_selections(soon, monkeypatch):
-    monkeypatch.setattr(form_policy, "NODES", 0)
-    monkeypatch.setattr(lookahead, "NODES", 0)
+    monkeypatch.setattr(nodes, "FORM_AFTER", 0)
+    monkeypatch.setattr(nodes, "NODES", 0)
     rng, several, looked = np.random.default_rng(5), 0, 0
     for _ in range(40):
         problem = random_problem(rng, int(rng.integers(3, 6)))
@@ -51,7 +51,7 @@ def test_the_roots_are_those_of_the_other_rule(name, soon, monkeypatch):
     problem, alpha = named(name)
     ahead = proven_roots(problem, alpha)
     assert soon
-    monkeypatch.setattr(lookahead, "NODES", 10**9)
+    monkeypatch.setattr(nodes, "NODES", 10**9)
     plain = proven_roots(problem, alpha)
     assert not differences(ahead, plain, rtol=1e-9)
     assert ahead.stats.nodes != plain.stats.nodes
@@ -59,8 +59,8 @@ def test_the_roots_are_those_of_the_other_rule(name, soon, monkeypatch):
 
 def test_the_tree_is_the_same_with_workers(soon, monkeypatch):
     problem, alpha = named("wedge-14-5")
-    monkeypatch.setattr(parallel, "NODES", 16)
-    monkeypatch.setattr(parallel, "FIRST", 8)
+    monkeypatch.setattr(setup, "NODES", 16)
+    monkeypatch.setattr(setup, "FIRST", 8)
     found = []
     for workers in (1, 2):
         with ThreadPoolExecutor(workers) as executor:
@@ -88,7 +88,7 @@ def test_a_resumed_search_learns_the_rule_from_its_file(share, soon, tmp_path):
 
 def test_a_resumed_search_that_did_not_look_ahead_does_not(soon, monkeypatch, tmp_path):
     (problem, alpha), path = named("wedge-14-5"), tmp_path / "x.proof"
-    monkeypatch.setattr(lookahead, "NODES", 10**9)
+    monkeypatch.setattr(nodes, "NODES", 10**9)
     whole = enumerate_roots(problem, alpha, proof_path=path)
     path.write_bytes(path.read_bytes()[:-2000])
     found = proven_roots(problem, alpha, proof_path=path, resume=True)

@@ -17,10 +17,9 @@ from trees import above_known_roots, by_the_tree
 
 from enumsol import enumerate_roots, gallery, is_unique, verify
 from enumsol.model.statuses import UNDECIDED
-from enumsol.search import definite, fathoming as closing, parallel, reduction
+from enumsol.search import definite, fathoming as closing, reduction, setup
 from enumsol.search.definite import Nodes
-from enumsol.search.fathoming_in_contact import KnownRoot
-from enumsol.search.reduction import Reduction
+from enumsol.search.reduction import KnownRoot, Reduction
 from enumsol.support.deadlines import TimeOverError
 
 
@@ -263,8 +262,8 @@ def test_the_tree_without_them_finds_the_same():
 
 @pytest.mark.slow
 def test_workers_know_the_root(monkeypatch):
-    monkeypatch.setattr(parallel, "FIRST", 8)
-    monkeypatch.setattr(parallel, "NODES", 16)
+    monkeypatch.setattr(setup, "FIRST", 8)
+    monkeypatch.setattr(setup, "NODES", 16)
     problem = gallery.get("wedge-8-5").build()
     with above_known_roots(), ThreadPoolExecutor(2) as executor:
         alone, together = enumerate_roots(problem, 2.2), enumerate_roots(problem, 2.2, executor=executor)

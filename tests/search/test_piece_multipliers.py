@@ -10,8 +10,8 @@ from enumsol import enumerate_roots
 from enumsol.condensation.space_condensed import AlphaSpace
 from enumsol.model.sectors import SECTORS
 from enumsol.relaxation.engine import PRUNE_MARGIN
-from enumsol.search.space.piece_multipliers import AlphaPoint, PieceBounds
-from enumsol.search.space.space_setup import SpaceSolvers
+from enumsol.search.space.piece_proposals import AlphaPoint, PieceBounds
+from enumsol.search.space.space_search import SpaceSolvers
 from enumsol.trusted.space.pieces import AlphaPiece
 from enumsol.trusted.space.sector_rows import CONTACT, OPEN, STICK
 

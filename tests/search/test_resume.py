@@ -42,12 +42,11 @@ import enumsol
 from enumsol import ContactProblem, Interrupted, InvalidArgumentError, Proof, enumerate_roots, gallery, verify
 from enumsol.condensation.data import EXACT_DOF_LIMIT
 from enumsol.condensation.enclosure import NotEnclosedError
-from enumsol.proof.begun import BegunProof
 from enumsol.proof.leaves import leaves_of
 from enumsol.proof.records import Tree
-from enumsol.proof.writer import BESIDE, FLUSH_EVERY
-from enumsol.search import form_policy as policy
-from enumsol.search.resume import Replay
+from enumsol.proof.writer import BESIDE, FLUSH_EVERY, BegunProof
+from enumsol.search import nodes as policy
+from enumsol.search.setup import Replay
 
 QUICK = settings(max_examples=60, deadline=None, suppress_health_check=list(HealthCheck), derandomize=True)
 
@@ -401,8 +400,8 @@ def test_arguments(tmp_path):
 CHILD = textwrap.dedent("""
     import signal, sys
     from enumsol import enumerate_roots, gallery
-    from enumsol.search import form_policy as forms
-    forms.NODES = 100
+    from enumsol.search import nodes as forms
+    forms.FORM_AFTER = 100
     path, at, resume = sys.argv[1], int(sys.argv[2]), sys.argv[3] == "resume"
     def wait(progress):
         if progress.nodes + progress.resumed >= at:
@@ -451,7 +450,7 @@ def test_kill_9(tmp_path):
 
 @pytest.mark.parametrize("at", [64, 448])
 def test_ctrl_c_of_a_resumed_search(at, tmp_path, monkeypatch):
-    monkeypatch.setattr(policy, "NODES", 1)
+    monkeypatch.setattr(policy, "FORM_AFTER", 1)
     (problem, alpha), path = named("wedge-14-5"), tmp_path / "x.proof"
 
     def stop(progress):

@@ -14,7 +14,7 @@ from proof_tools import bytes_of, kinds_of
 
 import enumsol
 from enumsol import enumerate_roots, gallery, verify
-from enumsol.search import parallel
+from enumsol.search import setup
 
 pytestmark = pytest.mark.usefixtures("tree_only")
 
@@ -133,7 +133,7 @@ def test_limits(limits, executors, many):
 
 @pytest.mark.slow
 def test_an_interruption_keeps_what_was_found(executors, many, monkeypatch):
-    monkeypatch.setattr(parallel, "NODES", 16)
+    monkeypatch.setattr(setup, "NODES", 16)
     problem, whole = many
     stop = CtrlC(lambda progress: progress.covered > 0.5)
     partial = interrupted("roots so far", enumerate_roots, problem, 0, executor=executors[1], progress=stop)

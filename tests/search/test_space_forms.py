@@ -26,7 +26,8 @@ from trees import by_the_tree, forms_at_once
 from enumsol import enumerate_roots, fem, verify
 from enumsol.arithmetic.balls import SAFE
 from enumsol.checker.space_checker import SpaceChecker
-from enumsol.search.space.space_setup import SpaceSolvers
+from enumsol.checker.walk import TreeCell
+from enumsol.search.space.space_search import SpaceSolvers
 from enumsol.trusted.space.sector_margins import SlipForm
 
 
@@ -168,11 +169,11 @@ def test_a_form_that_is_not_convex_proves_nothing(with_form):
     checker._read_header(records[0])
     (place, *_), codes = by_forms(records), dict(leaves_of(records))
     checker._declare(records[of_kind(records, "q")[0]])
-    assert checker._leaf(codes[place], in_file(records[place])) is None
+    assert checker._leaf(TreeCell(codes[place]), in_file(records[place])) is None
     form = checker._form(1)
     object.__setattr__(form, "H", form.H - 10.0 * np.eye(len(form.h)))
     del form.__dict__["smallest_eigenvalue"]
-    assert "do not exclude" in checker._leaf(codes[place], in_file(records[place]))
+    assert "do not exclude" in checker._leaf(TreeCell(codes[place]), in_file(records[place]))
 
 
 @pytest.mark.slow

@@ -11,14 +11,14 @@ from interruptions import CtrlC, interrupted
 from proof_tools import by_forms, bytes_of, records_of
 
 from enumsol import enumerate_roots, gallery, verify
-from enumsol.search import form_policy as policy, parallel, parts
+from enumsol.search import nodes as policy, parts, setup
 from enumsol.support.workers import Crew
 
 
 @pytest.fixture
 def small_parts(monkeypatch):
-    monkeypatch.setattr(parallel, "NODES", 16)
-    monkeypatch.setattr(parallel, "FIRST", 8)
+    monkeypatch.setattr(setup, "NODES", 16)
+    monkeypatch.setattr(setup, "FIRST", 8)
 
 
 @pytest.fixture(scope="module")
@@ -53,7 +53,7 @@ def test_no_part_is_long_and_no_worker_waits(small_parts, monkeypatch, wedge, ne
 
     def made(*arguments):
         nonlocal spread
-        spread = parallel.SpreadSearch(*arguments)
+        spread = setup.SpreadSearch(*arguments)
         return spread
 
     spread = None
@@ -109,7 +109,7 @@ def test_one_proof(small_parts, wedge):
 @pytest.mark.few(0, 1)
 @pytest.mark.parametrize("nodes", [0, 100])
 def test_one_proof_with_forms(small_parts, tree_only, monkeypatch, nodes):
-    monkeypatch.setattr(policy, "NODES", nodes)
+    monkeypatch.setattr(policy, "FORM_AFTER", nodes)
     problem = gallery.clamped_block(32, 16)
     whole = enumerate_roots(problem, 0.3)
     found = check_one_proof(problem, 0.3, whole)

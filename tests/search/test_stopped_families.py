@@ -15,7 +15,7 @@ from rational_checker import check_records
 
 from enumsol import ContactProblem, enumerate_roots
 from enumsol.proof.writer import FLUSH_EVERY, KeptRecords, ProofWriter
-from enumsol.search import parallel
+from enumsol.search import setup
 from enumsol.search.certifiers.verified import VerifiedCertifier
 from enumsol.support.deadlines import TimeOverError
 
@@ -118,7 +118,7 @@ def test_wherever_a_search_is_stopped_its_proof_says_what_it_lists(name):
 @pytest.mark.parametrize("name", FEW)
 def test_workers_leave_continua_whole(name):
     problem, _, whole = known(name)
-    with ThreadPoolExecutor(2) as executor, mock.patch.multiple(parallel, NODES=3, FIRST=2):
+    with ThreadPoolExecutor(2) as executor, mock.patch.multiple(setup, NODES=3, FIRST=2):
         for nodes in range(1, whole.stats.nodes + 1, 2):
             check(name, enumerate_roots(problem, 0, max_nodes=nodes, executor=executor))
 

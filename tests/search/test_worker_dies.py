@@ -18,7 +18,7 @@ from proof_tools import bytes_of
 
 import enumsol
 from enumsol import Proof, enumerate_roots, gallery, multiplicity_table, verify, write_problem
-from enumsol.search import parallel
+from enumsol.search import setup
 from enumsol.support import workers
 from enumsol.support.workers import Crew, RenewedPool
 
@@ -31,8 +31,8 @@ ALPHAS = [0.0, 1.0, 2.0, 3.5, 5.0, 7.0]
 
 @pytest.fixture(autouse=True)
 def small_tasks(monkeypatch):
-    monkeypatch.setattr(parallel, "NODES", 8)
-    monkeypatch.setattr(parallel, "FIRST", 8)
+    monkeypatch.setattr(setup, "NODES", 8)
+    monkeypatch.setattr(setup, "FIRST", 8)
 
 
 @pytest.fixture(scope="module")

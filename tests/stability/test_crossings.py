@@ -12,7 +12,7 @@ from linear_motions import random_motion, setting
 
 import enumsol
 from enumsol.branches.stability import ArcStabilities
-from enumsol.search.growing_motions import GrowingMotions
+from enumsol.search.growing_motions import crossing_near
 from enumsol.search.stability import StabilitySearch
 from enumsol.trusted.running_away import Crossing
 
@@ -35,7 +35,7 @@ def proven_crossings(seeds):
         stiffness, motions = setting(*data)
         growing = StabilitySearch(stiffness, motions).run().growing
         for known, _ in growing:
-            found = GrowingMotions(stiffness, motions).crossing_near(known)
+            found = crossing_near(stiffness, motions, known)
             if found is not None:
                 yield stiffness, motions, found, [mu for mu, *_ in growing_motions(*data)]
 
@@ -103,7 +103,7 @@ def test_a_motion_that_no_weights_find():
     assert np.linalg.eigvalsh(K)[0] > 0
     data = (K, np.eye(4), np.eye(4)[:2], np.eye(4)[2:], F, ["limit", "limit"], np.ones(2))
     stiffness, motions = setting(*data)
-    crossing = GrowingMotions(stiffness, motions).crossing_near(StabilitySearch(stiffness, motions).run().growing[0][0])
+    crossing = crossing_near(stiffness, motions, StabilitySearch(stiffness, motions).run().growing[0][0])
     assert crossing.push is None
     assert crossing.holds(stiffness, motions)
     assert any(crossing.low <= mu <= crossing.high for mu, *_ in growing_motions(*data))
@@ -117,7 +117,7 @@ def test_a_motion_that_begins_to_grow_where_the_form_is_definite():
     data = (A, M, np.eye(2)[:1], np.eye(2)[1:], np.array([1.5]), ["limit"], np.ones(1))
     stiffness, motions = setting(*data)
     ((known, _),) = StabilitySearch(stiffness, motions).run().growing
-    crossing = GrowingMotions(stiffness, motions).crossing_near(known)
+    crossing = crossing_near(stiffness, motions, known)
     assert crossing.holds(stiffness, motions)
     # (2 - 0.6) + mu (1 - 1.35) = 0
     assert crossing.low < 1.4 / 0.35 < crossing.high

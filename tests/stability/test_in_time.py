@@ -24,11 +24,11 @@ def check_leaving(data):
     stiffness, motions = setting(*data)
     proven = StabilitySearch(stiffness, motions).run()
     assert proven.growing
-    for _, motion in proven.growing:
-        low, high = motion.mu
+    for certificate, motion in proven.growing:
+        low, high = certificate.low, certificate.high
         rho = np.sqrt(0.5 * (low + high))
         K = stiffness.at(low).mid
-        claimed = np.linalg.solve(A + low * M, stiffness.rows.T @ (K @ (motions.moves.mid @ motion.x.mid)))
+        claimed = np.linalg.solve(A + low * M, stiffness.rows.T @ (K @ (motions.moves.mid @ motion.mid)))
         claimed /= np.linalg.norm(claimed)
         # to the last bits: what flutters beside it may grow much faster
         judged = [(v / np.linalg.norm(v), own) for mu, v, own in growing_motions(*data)]

@@ -36,9 +36,8 @@ def compared(seeds, *, in_space=False, **kind):
             assert (said == "runs away") == bool(judged), seed
         for leaf in proven.leaves:
             assert leaf.holds(stiffness, motions)
-        for _, motion in proven.growing:
-            low, high = motion.mu
-            assert any(low * (1 - 1e-6) <= mu <= high * (1 + 1e-6) for mu, *_ in judged), seed
+        for own, _ in proven.growing:
+            assert any(own.low * (1 - 1e-6) <= mu <= own.high * (1 + 1e-6) for mu, *_ in judged), seed
     return counts
 
 
@@ -114,9 +113,9 @@ def test_a_node_that_touches_in_space_sticks_or_is_open(press, shear, code):
     assert judged
     assert [own.way.touching for own, _ in growing] == ([(code,)] if code is not None else [])
     if code is not None:
-        [(_, motion)] = growing
-        assert any(motion.mu[0] * (1 - 1e-6) <= mu <= motion.mu[1] * (1 + 1e-6) for mu in judged)
-        assert code == OPEN or motion.mu[0] == pytest.approx(0.35)
+        [(own, _)] = growing
+        assert any(own.low * (1 - 1e-6) <= mu <= own.high * (1 + 1e-6) for mu in judged)
+        assert code == OPEN or own.low == pytest.approx(0.35)
 
 
 @pytest.mark.slow

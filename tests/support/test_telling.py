@@ -10,7 +10,7 @@ from enumsol import ContactProblem, gallery
 from enumsol.condensation.exact import ExactSystem
 from enumsol.support.deadlines import heard_by, tell, tell_part
 from enumsol.support.messages import counted, shortened
-from enumsol.trusted.arcs.precise import PreciseSystem
+from enumsol.trusted.arcs.precise import system_in_many_digits
 
 
 def told_by(work):
@@ -47,7 +47,7 @@ def test_condensing_tells_every_few_columns():
     problem = gallery.wedge(4, 4)
     columns = told_by(lambda: ExactSystem.from_problem(problem, 1))["columns of A^-1 B' in rationals"]
     assert columns == [(k, 2 * problem.p + 2) for k in range(0, 2 * problem.p + 2, 4)]
-    bits = told_by(lambda: PreciseSystem.of(problem))["bits of A^-1 B'"]
+    bits = told_by(lambda: system_in_many_digits(problem))["bits of A^-1 B'"]
     assert len(bits) > 2
     assert bits == sorted(bits)
     assert "columns of A^-1 B'" in told_by(lambda: gallery.wedge(3, 3).enclosure)

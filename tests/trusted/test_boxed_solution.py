@@ -20,8 +20,8 @@ from space_proofs import RANDOM, random_problem
 
 from enumsol import enumerate_roots
 from enumsol.arithmetic.balls import Ball
-from enumsol.search.space.box_proposals import box_around, proposed_rho
-from enumsol.search.space.space_setup import SpaceSolvers
+from enumsol.search.space.open_leaves import box_around, proposed_rho
+from enumsol.search.space.space_search import SpaceSolvers
 from enumsol.trusted.space.boxed_solution import (
     Box,
     BoxedSolution,
@@ -82,7 +82,7 @@ def natural(problem, y):
 
 @pytest.mark.slow
 def test_steps_stay_within_their_bounds():
-    """zeta - Y N(y) is what (12.13b) says, and contracts, at random points of sets of all sizes."""
+    """zeta - Y N(y) is what (12.7) and (12.13) say, and contracts, at random points of sets of all sizes."""
     rng, tried = np.random.default_rng(0), 0
     for seed in range(some(12, of=60)):
         solvers, y, _, _, _ = boxed(seed)

@@ -9,7 +9,7 @@ import pytest
 from enumsol.model import statuses
 from enumsol.model.statuses import RowKind
 from enumsol.relaxation.active_set import interval_rows
-from enumsol.relaxation.imposed_rows import EQUALITY, INEQUALITY, imposed_rows, status_rows, with_implied
+from enumsol.relaxation.engine import EQUALITY, INEQUALITY, imposed_rows, status_rows, with_implied
 from enumsol.trusted import over_interval as interval, status_rows as rows
 
 NAMES = ("OPEN", "STICK", "SLIP_PLUS", "SLIP_MINUS", "FRICTIONLESS", "CONTACT", "UNDECIDED", "FORWARD", "BACKWARD")

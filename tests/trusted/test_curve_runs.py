@@ -14,7 +14,7 @@ from enumsol import enumerate_roots
 from enumsol.arithmetic.balls import Ball
 from enumsol.branches.space.space_graph import ByCurves
 from enumsol.condensation.space_condensed import AlphaSpace
-from enumsol.search.space.piece_certificates import ExaminedPiece, runs_over
+from enumsol.search.space.piece_proposals import ExaminedPiece, runs_over
 from enumsol.trusted.space import curve_runs
 from enumsol.trusted.space.curve_runs import CurveParts, KnownCurve, LinkRange
 from enumsol.trusted.space.pieces import AlphaPiece
@@ -125,7 +125,7 @@ def test_a_form_leaves_only_the_solutions_of_its_curve(p, seed):
                 parts = known.over(run, low, high)
                 for codes in product((UNDECIDED, OPEN, CONTACT, STICK), repeat=p):
                     all_runs += 1
-                    numbers = at.proposals.numbers(codes, parts) if parts.allowed(codes) else None
+                    numbers = at.numbers(codes, parts) if parts.allowed(codes) else None
                     if numbers is None or not piece.lies_on(known, run, codes, numbers):
                         continue
                     accepted += 1
@@ -144,7 +144,7 @@ def test_numbers_that_make_no_sense_are_refused():
     piece = piece_over(cover, low, high)
     run = next(run for run in runs_over(known, low, high))
     codes = (UNDECIDED,)
-    numbers = ExaminedPiece(piece).proposals.numbers(codes, known.over(run, low, high))
+    numbers = ExaminedPiece(piece).numbers(codes, known.over(run, low, high))
     assert piece.lies_on(known, run, codes, numbers)
     for place, value in ((0, -1.0), (1, 0.0), (2, 9.0), (4, np.inf), (5, 40.0)):
         changed = numbers.copy()

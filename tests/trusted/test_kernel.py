@@ -17,8 +17,8 @@ from enumsol.search.certifiers._margin import Margins
 from enumsol.search.solvers import Solvers
 from enumsol.trusted import at_alpha as point
 from enumsol.trusted.at_alpha import solve_selection
-from enumsol.trusted.energy_bounds import energy_bounds
 from enumsol.trusted.exclusion import Leaves, exclusion_margin, exclusion_margins
+from enumsol.trusted.quadratic_forms import energy_bounds
 from enumsol.trusted.status_rows import row_signs
 
 CODES = (0, 1, 2, 3, 5, 6)

@@ -12,7 +12,7 @@ from enumsol.branches.space.chains import chain_through
 from enumsol.condensation.space_condensed import AlphaSpace
 from enumsol.model.sectors import DEEPEST, SECTORS, places
 from enumsol.search.space.curve_proposals import placed
-from enumsol.search.space.space_setup import SpaceSolvers
+from enumsol.search.space.space_search import SpaceSolvers
 from enumsol.trusted.space.leaves import SpaceRoot
 from enumsol.trusted.space.pieces import AlphaPiece
 from enumsol.trusted.space.solution_curve import AlphaProblem
@@ -126,7 +126,7 @@ def test_roots_on_an_arc_are_on_one_curve(p, seed):
             alpha = piece.low + (piece.high - piece.low) * k / 8
             for root in enumsol.enumerate_roots(problem, alpha):
                 narrow = leaf_of(root, problem, 14, NoTurn())
-                there = piece.point_at(alpha).held(narrow)
+                there = piece.over(alpha, alpha).held(narrow)
                 if isinstance(there, SpaceRoot) and arc.has(there, narrow):
                     on_it.append(root)
         if len(on_it) < 2:

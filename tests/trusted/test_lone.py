@@ -10,7 +10,7 @@ from rational_forms import Data, Forms, Refused, exact
 from touching import problem_of_any_kind
 
 from enumsol.condensation.enclosure import CondensedEnclosure
-from enumsol.search.fathoming_in_contact import KnownRoot, Lone as Proposed
+from enumsol.search.reduction import KnownRoot, Lone as Proposed
 from enumsol.search.solvers import make_engine
 from enumsol.search.splitting import ImposedRows, PlaneSplitting
 from enumsol.trusted import uniqueness as lone

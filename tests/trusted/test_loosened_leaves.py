@@ -10,7 +10,7 @@ from problems3d import OneNode
 from enumsol import enumerate_roots
 from enumsol.condensation.space_condensed import AlphaSpace
 from enumsol.model.sectors import DEEPEST, SECTORS, direction, end_number, places
-from enumsol.search.space.space_setup import SpaceSolvers
+from enumsol.search.space.space_search import SpaceSolvers
 from enumsol.trusted.space import leaf_equations
 from enumsol.trusted.space.leaf_equations import Leaf
 from enumsol.trusted.space.leaves import Open, SpaceRoot, contents

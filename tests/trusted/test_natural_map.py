@@ -183,7 +183,7 @@ def test_tangents_around_zero_may_slip(middle):
     z = np.array([1.0, *middle])
     box = Ball(z, np.array([0.1, 1.0, 0.5]))
     found = Discs(np.array([[1, 2]]), Ball.exact(np.full(1, 0.1)), np.zeros(1)).corners(box)
-    # (12.17) where z_t = (1, 0) and (0, 0.5), and the identity
+    # (12.11) where z_t = (1, 0) and (0, 0.5), and the identity
     for D in ([[1, 0, 0], [0.1, 0, 0], [0, 0, 0.1]], [[1, 0, 0], [0, 0.2, 0], [0.1, 0, 0]], np.eye(3)):
         assert np.all(np.abs(D - found.core.mid[:, :3]) <= found.core.rad[:, :3])
     at = Directions.of(Ball(z[None, 1:], box.rad[None, 1:]))

@@ -1,5 +1,6 @@
 """Exclusion and leaves over a piece of alpha in 3D against solutions and minima at sampled alphas."""
 
+from dataclasses import replace
 from fractions import Fraction
 
 import numpy as np
@@ -10,11 +11,11 @@ from space_proofs import random_problem
 from enumsol import enumerate_roots
 from enumsol.arithmetic.balls import Ball
 from enumsol.branches.space.chains import chain_through
-from enumsol.condensation.space_condensed import AlphaSpace, EnclosedSpace, PieceSpace, PieceTurn
+from enumsol.condensation.space_condensed import AlphaSpace, EnclosedSpace, PieceTurn
 from enumsol.model.sectors import SECTORS, nearest, start_of
 from enumsol.search.space.curve_proposals import placed
-from enumsol.search.space.piece_multipliers import PieceBounds
-from enumsol.search.space.space_setup import SpaceSolvers
+from enumsol.search.space.piece_proposals import PieceBounds
+from enumsol.search.space.space_search import SpaceSolvers
 from enumsol.trusted.space.leaf_equations import Leaf, slopes_by_second
 from enumsol.trusted.space.leaves import Open, SpaceRoot
 from enumsol.trusted.space.pieces import AlphaPiece, lie_along
@@ -429,7 +430,7 @@ def steep_piece(p, seed, share, level, loose):
     held = EnclosedSpace(S, zero, g, none.mid, F, 0.0 * F, tau, unit)
     along = PieceTurn(*map(Ball.exact, (g, rate, disc, grows)))
     wide = (np.abs(part) * (1.0 + 1e-12) for part in (rate, grows))
-    whole = PieceSpace(S, zero, g, next(wide), F, 0.0 * F, tau, unit, disc, next(wide), along, held)
+    whole = replace(held, g_rad=next(wide), discs=Ball(disc, next(wide)), turn=along, fixed=held)
     codes = [SECTORS + int(rng.integers(1 << level, 2 << level)) for _ in range(p)]
     return Leaf(whole, codes, rng.permutation(p)[:loose])
 

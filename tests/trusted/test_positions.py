@@ -9,7 +9,7 @@ from complete import accepted_report
 import enumsol
 from enumsol.arithmetic.balls import Ball
 from enumsol.gallery import dovetail
-from enumsol.trusted.arcs.precise import PreciseSelection, PreciseSystem
+from enumsol.trusted.arcs.precise import PreciseSelection, system_in_many_digits
 from enumsol.trusted.positions import certain_statuses
 from enumsol.trusted.status_rows import OPEN, SLIP_MINUS, SLIP_PLUS, STICK
 
@@ -50,7 +50,7 @@ def test_every_offset_in_a_ball_leads_into_the_ball_of_positions():
     for problem, root in mixed():
         codes = [CODES[str(status)] for status in root.statuses]
         centre, radius = problem.slip_offset, np.full(3, 2.0**-24)
-        found = PreciseSelection(PreciseSystem.of(problem), codes).positions(Fraction(0), Ball(centre, radius))
+        found = PreciseSelection(system_in_many_digits(problem), codes).positions(Fraction(0), Ball(centre, radius))
         moving, farthest = [k for k, code in enumerate(codes) if code != STICK], np.zeros(3)
         for _ in range(8):
             exact = positions(problem, root, centre + radius * rng.choice([-1.0, 1.0], 3))
@@ -91,5 +91,5 @@ def test_a_history_on_weak_springs_starts_every_step_from_what_is_known_to_many_
     problem = dovetail(friction=0.3)
     history = enumsol.histories(problem, [0.5 * problem.f, problem.f, 0.9 * problem.f], max_nodes=3000)
     assert (history.complete, history.unique_until) == (True, 3)
-    assert max(stage.largest_radius for stage in history.data.stages) < 1e-15
+    assert max(stage.largest_radius for stage in history.all_stages) < 1e-15
     assert accepted_report(problem, history.proof).unique_until == 3

@@ -15,10 +15,9 @@ from enumsol.arithmetic.algebraic import real_roots
 from enumsol.branches.enclosed.zeros import zeros_of
 from enumsol.condensation.exact import ExactCondensed
 from enumsol.gallery import wedge
-from enumsol.trusted.arcs import many_digits as refined
-from enumsol.trusted.arcs.many_digits import PRECISION, ball_of, precision, upper, uppers
-from enumsol.trusted.arcs.precise import PreciseSelection, PreciseSystem
-from enumsol.trusted.arcs.taylor import Smooth
+from enumsol.trusted.arcs import precise as refined
+from enumsol.trusted.arcs.precise import PreciseSelection, system_in_many_digits
+from enumsol.trusted.arcs.taylor import PRECISION, Smooth, ball_of, precision, upper, uppers
 from enumsol.trusted.status_rows import FRICTIONLESS
 
 
@@ -198,7 +197,7 @@ def test_balls_over_an_interval_hold_the_unknowns_and_their_slopes():
 def test_conditions_of_a_body_that_moves_almost_freely_are_known_over_long_intervals(first):
     """All nodes slide: forces vary together, and a thousand times more than displacements do."""
     problem = wedge(4, 4)
-    system = PreciseSystem.of(problem)
+    system = system_in_many_digits(problem)
     assert system is not None
     selection = PreciseSelection(system, (first, *[2] * (problem.p - 1)))
     low, high = Fraction(109, 100), Fraction(111, 100)
@@ -233,7 +232,7 @@ def test_floats_are_upper_bounds():
 
 
 def _lie_in_their_balls(problem, radius):
-    ours, exact = PreciseSystem.of(problem), ExactCondensed.from_problem(problem)
+    ours, exact = system_in_many_digits(problem), ExactCondensed.from_problem(problem)
     assert ours is not None
     with ctx.workprec(4 * PRECISION):
         for r, row in enumerate(exact.rows):
@@ -243,7 +242,7 @@ def _lie_in_their_balls(problem, radius):
                 assert ball.contains(arb(value))
                 assert float(ball.rad()) <= radius * max(1.0, abs(float(arb(value))))
         for parts in ((ours.F0, exact.F0), (ours.F1, exact.F1)):
-            assert all(ball.contains(arb(value)) for ball, value in zip(*parts, strict=True))
+            assert all(arb(number) == arb(value) for number, value in zip(*parts, strict=True))
 
 
 @pytest.mark.parametrize(("bits", "radius"), [(refined._RESIDUAL_BITS, 1e-80), (30, 1e-8)])
@@ -265,7 +264,7 @@ def test_condensed_data_of_entries_of_all_sizes_lie_in_their_balls():
         f = np.array([1e-30, 0.0, 1e3, 1.0, -3.0, 1e-300]) * size
         rows = np.eye(6)[:4]
         problem = ContactProblem(A, rows[:2], rows[2:], f, load_slope=np.zeros(6), friction=0.5)
-        ours, exact = PreciseSystem.of(problem), ExactCondensed.from_problem(problem)
+        ours, exact = system_in_many_digits(problem), ExactCondensed.from_problem(problem)
         assert ours is not None
         with ctx.workprec(4 * PRECISION):
             for r, row in enumerate(exact.rows):

@@ -15,7 +15,7 @@ from enumsol import ContactProblem
 from enumsol.arithmetic.rationals import rational
 from enumsol.condensation.exact import ExactSystem
 from enumsol.selections.rational_selections import ExactSelections
-from enumsol.trusted.arcs.precise import PreciseAtAlpha
+from enumsol.trusted.arcs.precise import verified_in_many_digits
 from enumsol.trusted.at_alpha import solve_selection
 
 
@@ -33,7 +33,7 @@ def nearly_singular(n, **changes):
 
 def scaled(problem, alpha):
     system = problem.condensed.at(alpha).scaled
-    return system, PreciseAtAlpha.of(problem, Fraction(alpha), system.force, system.length)
+    return system, verified_in_many_digits(problem, Fraction(alpha), system.force, system.length)
 
 
 def test_balls_hold_the_solution_in_rationals_and_know_its_signs(rng):
@@ -49,7 +49,7 @@ def test_balls_hold_the_solution_in_rationals_and_know_its_signs(rng):
         system, precise = scaled(problem, alpha)
         exact = ExactSelections(ExactSystem.from_problem(problem, alpha))
         for codes in product(range(4), repeat=p):
-            found, expected = precise.solve(codes), exact.solve_equations(codes)
+            found, expected = precise(codes), exact.solve_equations(codes)
             assert (found is None) == (expected is None)
             if expected is None:
                 continue
@@ -69,8 +69,8 @@ def test_a_singular_selection_is_none():
     problem = ContactProblem([[2.0, 1.0], [1.0, 1.0]], [[1, 0]], [[0, 1]], [1.0, 0.5], friction=1.0)
     _, precise = scaled(problem, 0.0)
     # S = (1 -1; -1 2), so that S_nn + F S_nt = 0
-    assert precise.solve((2,)) is None
-    assert precise.solve((3,)) is not None
+    assert precise((2,)) is None
+    assert precise((3,)) is not None
 
 
 def test_double_arithmetic_leaves_open_what_many_digits_decide():
@@ -80,7 +80,7 @@ def test_double_arithmetic_leaves_open_what_many_digits_decide():
     for codes, root in (((1,), False), ((2,), True)):
         ball = solve_selection(enclosed, codes)
         assert ball is None or not (ball.is_root or ball.is_excluded)
-        found = precise.solve(codes)
+        found = precise(codes)
         assert (found.is_root, found.is_excluded) == (root, not root)
 
 

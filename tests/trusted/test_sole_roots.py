@@ -15,7 +15,7 @@ from space_judge import judge_records
 
 import enumsol
 from enumsol.arithmetic.balls import Ball
-from enumsol.search.space.sole_roots import sole_turns
+from enumsol.search.space.space_references import sole_turns
 from enumsol.trusted.space.force_bound import ForceBound
 from enumsol.trusted.uniqueness_forms import Multipliers
 

@@ -8,15 +8,16 @@ import pytest
 from effort import some
 from problems3d import from_compliance, random_compliance
 
+from enumsol.model.statuses import UNDECIDED
 from enumsol.search.space.space_fathoming import SpaceCloser
 from enumsol.search.space.space_newton import Isotropic
-from enumsol.search.space.space_setup import SpaceSolvers
+from enumsol.search.space.space_search import SpaceSolvers
 from enumsol.trusted.space.leaves import SpaceRoot
 from enumsol.trusted.space.space_uniqueness import (
     LARGEST_UNIT,
-    OnlySolution,
+    LooseSolution,
     SpaceWeights,
-    only_root,
+    lone_root,
     only_solution_in_space,
 )
 
@@ -56,14 +57,17 @@ def a_member(enclosed, rng):
 @pytest.mark.slow
 @pytest.mark.parametrize("degenerate", [False, True])
 def test_solutions_for_all_data_lie_in_the_balls(degenerate):
-    rng, concluded, nearest = np.random.default_rng(4), {SpaceRoot: 0, OnlySolution: 0}, 0.0
+    rng, concluded, nearest = np.random.default_rng(4), {SpaceRoot: 0, LooseSolution: 0}, 0.0
     for _ in range(some(20, of=60)):
         solvers = random_solvers(rng, degenerate)
         width = 10.0 ** rng.uniform(-9, -3.5)
         S, g = solvers.enclosed.S, solvers.enclosed.g
         enclosed = replace(solvers.enclosed, S_rad=np.full_like(S, width), g_rad=np.full_like(g, width))
         for numbers, codes, normal in proposed(solvers):
-            found = only_root(enclosed, numbers, codes) if codes else only_solution_in_space(enclosed, numbers, normal)
+            whole = (UNDECIDED,) * len(normal)
+            found = only_solution_in_space(enclosed, numbers, normal)
+            if codes:
+                found = lone_root(enclosed, whole, numbers, codes)
             if found is None:
                 continue
             concluded[type(found)] += 1
@@ -73,16 +77,14 @@ def test_solutions_for_all_data_lie_in_the_balls(degenerate):
                 problem = Isotropic.of(system)
                 y = problem.solution()
                 w = problem.displacements(y)
-                taus = system.tau >= 0
-                flat = np.concatenate([y[:, 0], y[:, 1:][taus] / system.unit[system.tau[taus]]])
-                off = np.abs(flat - found.y.mid) - found.y.rad
+                off = np.abs(y / system.unit - found.y.mid) - found.y.rad
                 assert np.max(off) <= 1e-9
                 nearest = max(nearest, float(np.max((off + found.y.rad) / (found.y.rad + 1e-12))))
-                slips = np.concatenate([w[:, 0], w[:, 1:][taus] * system.unit[system.tau[taus]]])
-                assert np.all(np.abs(slips - found.w.mid) <= found.w.rad + 1e-8)
-                if isinstance(found, OnlySolution):
-                    statuses(found, y, w, taus)
-    assert concluded[OnlySolution] > some(5, of=20)
+                assert np.all(np.abs(w * system.unit - found.w.mid) <= found.w.rad + 1e-8)
+                if isinstance(found, LooseSolution):
+                    pairs = (np.column_stack([part[: system.p], system.tangential(part)]) for part in (y, w))
+                    statuses(found, *pairs, system.tau >= 0)
+    assert concluded[LooseSolution] > some(5, of=20)
     assert degenerate or concluded[SpaceRoot] > some(5, of=20)
     # balls are not so wide that this would not tell
     assert nearest > 0.02
@@ -173,7 +175,7 @@ def test_units_beyond_the_largest_are_refused():
     solvers = SpaceSolvers(from_compliance(np.eye(3), np.ones(3), 0.5), 0.0, "verified")
     numbers, codes, normal = proposed(solvers)[0]
     unit = np.where(np.arange(3) > 0, 2.0 * LARGEST_UNIT, 1.0)
-    assert only_root(solvers.enclosed, numbers, codes) is not None
+    assert lone_root(solvers.enclosed, (UNDECIDED,) * len(codes), numbers, codes) is not None
     for enclosed in (replace(solvers.enclosed, unit=units) for units in (unit, 1.0 / unit)):
-        assert only_root(enclosed, numbers, codes) is None
+        assert lone_root(enclosed, (UNDECIDED,) * len(codes), numbers, codes) is None
         assert only_solution_in_space(enclosed, numbers, normal) is None

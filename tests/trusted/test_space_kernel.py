@@ -15,7 +15,7 @@ from enumsol import enumerate_roots
 from enumsol.arithmetic.balls import Ball, determinant_sign
 from enumsol.condensation.space_condensed import EnclosedSpace, SpaceSystem
 from enumsol.model.sectors import DEEPEST, RUN, SECTORS, contains, cut, end_number, is_sector, run_of, start_of
-from enumsol.search.space.space_setup import SpaceSolvers
+from enumsol.search.space.space_search import SpaceSolvers
 from enumsol.trusted.space import sector_rows as sr
 from enumsol.trusted.space.leaf_equations import Leaf
 from enumsol.trusted.space.leaves import SpaceRoot, _cut, distinct_roots, same_root, settle

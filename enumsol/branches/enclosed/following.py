@@ -39,13 +39,13 @@ from enumsol.roots.local_branch import named_statuses
 from enumsol.search.outcome import Stop
 from enumsol.support.deadlines import TimeOverError, over
 from enumsol.support.messages import counted, listed
-from enumsol.trusted.arcs.many_digits import affordable
-from enumsol.trusted.arcs.precise import PreciseSelection, PreciseSystem
+from enumsol.trusted.arcs.precise import PreciseSelection, system_in_many_digits
 from enumsol.trusted.arcs.selection_balls import ArcSelection, ArcSystem
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping, Sequence, Set
 
+    from enumsol.arithmetic.balls import Ball
     from enumsol.branches.elements import Pair
     from enumsol.model.problem import ContactProblem
     from enumsol.search.subintervals import SearchedPiece
@@ -83,7 +83,7 @@ class TracedProblem:
         self.units = scaled
         self.force, self.length = scaled.force, scaled.length
         self._systems = {
-            side: ArcSystem.of(problem, held.enclosure, self.force, self.length, side)
+            side: ArcSystem.of(problem, held.enclosure, self.force, self.length).beside_zero(side)
             for side in ((0.0,) if self.origin is None else (-1.0, 1.0))
         }
         self._selections: dict[tuple[Codes, float], ArcSelection] = {}
@@ -99,10 +99,10 @@ class TracedProblem:
         return type(self), (self.problem, self.interval, self.origin)
 
     @cached_property
-    def _precise_system(self) -> PreciseSystem | None:
-        return PreciseSystem.of(self.problem) if affordable(self.problem) else None
+    def _precise_system(self) -> ArcSystem[Any] | None:
+        return system_in_many_digits(self.problem)
 
-    def system(self, side: float) -> ArcSystem:
+    def system(self, side: float) -> ArcSystem[Ball]:
         """All selections in double arithmetic."""
         return self._systems[side]
 
@@ -120,8 +120,7 @@ class TracedProblem:
         except TimeOverError:
             return None
         if (codes, side) not in self._precise:
-            system = self._precise_system.constant_load(side) if side else self._precise_system
-            self._precise[codes, side] = PreciseSelection(system, codes)
+            self._precise[codes, side] = PreciseSelection(self._precise_system.beside_zero(side), codes)
         return self._precise[codes, side]
 
     # -- traces ----------------------------------------------------------------------------------------------------

@@ -185,38 +185,37 @@ def join(
     cut_short : selections that hold somewhere may be missing, as all do at the origin
     sparing : bounds are made narrower only where the order of the places is not known otherwise
     """
-    whole = not cut_short
-    joined = _Joining(traces, interval, origin, sharpen, whole=whole, sparing=sparing).run()
+    joined = _Joining(traces, interval, origin, sharpen, not cut_short, sparing).run()
     if sparing and not joined.ordered:
-        joined = _Joining(traces, interval, origin, sharpen, whole=whole, sparing=False).run()
+        joined = _Joining(traces, interval, origin, sharpen, not cut_short, sparing=False).run()
     return joined
 
 
+@dataclass
 class _Joining:
     """Traces being joined."""
 
-    def __init__(
-        self,
-        traces: Sequence[Trace],
-        interval: Bounds,
-        origin: Fraction | None,
-        sharpen: Callable[[Trace, ArcPart], Bounds | None],
-        *,
-        whole: bool,
-        sparing: bool,
-    ) -> None:
-        self._traces, self._interval, self._sharpen, self._sparing = traces, interval, sharpen, sparing
-        self._joined = Joined()
-        self._origin = None if origin is None else EventPlace(EventPlaceKind.ORIGIN, origin, origin, [], whole=whole)
+    traces: Sequence[Trace]
+    interval: Bounds
+    origin: Fraction | None
+    sharpen: Callable[[Trace, ArcPart], Bounds | None]
+    whole: bool
+    sparing: bool
+
+    def __post_init__(self) -> None:
+        origin, self._joined = self.origin, Joined()
+        self._origin = None
+        if origin is not None:
+            self._origin = EventPlace(EventPlaceKind.ORIGIN, origin, origin, [], whole=self.whole)
         self._parts = []
-        for trace in traces:
-            low, high = interval
+        for trace in self.traces:
+            low, high = self.interval
             if origin is not None:
                 low, high = (origin, high) if trace.side > 0 else (low, origin)
-            self._parts.append(list(parts_between(trace, low, high, sharpen)))
+            self._parts.append(list(parts_between(trace, low, high, self.sharpen)))
         self._found = {
             part: _Found(trace, part)
-            for trace, parts in zip(traces, self._parts, strict=True)
+            for trace, parts in zip(self.traces, self._parts, strict=True)
             for part in parts
             if part.kind in (ArcPartKind.EVENT, ArcPartKind.OPEN)
         }
@@ -225,11 +224,11 @@ class _Joining:
         """Places first, then the arcs between them."""
         self._match()
         self._gather()
-        for trace, parts in zip(self._traces, self._parts, strict=True):
+        for trace, parts in zip(self.traces, self._parts, strict=True):
             self._follow(trace, parts)
         places = self._joined.places
         if self._origin is not None:
-            self._origin.members = sorted({trace.selection.rows.codes for trace in self._traces})
+            self._origin.members = sorted({trace.selection.rows.codes for trace in self.traces})
             if any(place.low <= self._origin.low <= place.high for place in self._joined.open):
                 self._origin.kind = EventPlaceKind.OPEN  # unknown arcs may end there
             places.append(self._origin)
@@ -280,8 +279,8 @@ class _Joining:
     def _bounds(self, one: _Found, other: _Found) -> Bounds:
         """Bounds of the zero that two events have in common."""
         low, high = max(one.low, other.low), min(one.high, other.high)
-        for event in () if self._sparing else sorted((one, other), key=lambda event: event.codes):
-            sharper = self._sharpen(event.trace, event.part)
+        for event in () if self.sparing else sorted((one, other), key=lambda event: event.codes):
+            sharper = self.sharpen(event.trace, event.part)
             if sharper is not None:
                 return max(low, sharper[0]), min(high, sharper[1])
         return low, high
@@ -305,8 +304,8 @@ class _Joining:
             causes = {found.part.cause for found in group}
             cause = next((cause for cause in OpenCause if cause in causes), OpenCause.PARTNER)
             # what is shorter, beside the interval, and left open at its end would be decided elsewhere
-            if high - low <= Fraction(1, 2**30) * (self._interval[1] - self._interval[0]) and any(
-                low <= end <= high for end in self._interval
+            if high - low <= Fraction(1, 2**30) * (self.interval[1] - self.interval[0]) and any(
+                low <= end <= high for end in self.interval
             ):
                 cause = OpenCause.END
             some = [found.doubtful for found in group if len(found.doubtful) < len(found.codes)]
@@ -322,7 +321,7 @@ class _Joining:
         towards = origin is not None and trace.side == (-1.0 if upper else 1.0)
         if origin is not None and towards and ((alpha >= origin.low) if upper else (alpha <= origin.low)):
             return origin
-        end = self._interval[int(upper)]
+        end = self.interval[int(upper)]
         if (alpha < end) if upper else (alpha > end):
             return None
         place = EventPlace(EventPlaceKind.BORDER, end, end, [trace.selection.rows.codes])

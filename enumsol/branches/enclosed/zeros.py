@@ -12,7 +12,7 @@ import numpy as np
 from flint import arb
 
 from enumsol.arithmetic.balls import TINY
-from enumsol.trusted.arcs.many_digits import ball_of, precision
+from enumsol.trusted.arcs.taylor import ball_of, precision
 
 if TYPE_CHECKING:
     from collections.abc import Sequence

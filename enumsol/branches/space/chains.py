@@ -16,7 +16,7 @@ from scipy.optimize import brentq
 from enumsol.continuation.path import follow
 from enumsol.continuation.path_data import ContinuationOptions, PathStatus
 from enumsol.errors import EnumsolError, Interrupted, OutOfMemoryError
-from enumsol.search.space.curve_proposals import corner_steps, curve_around, curve_point, placed, stretch
+from enumsol.search.space.curve_proposals import curve_along, curve_point, placed, proven_point, stretch
 from enumsol.support.deadlines import TimeOverError, look, tell
 from enumsol.trusted.space.curve_runs import CurveChain, CurveLink, goes_on, link_between
 from enumsol.trusted.space.solution_curve import only_curve
@@ -34,8 +34,6 @@ if TYPE_CHECKING:
 
     Array = NDArray[np.float64]
 
-#: How much longer than the way between its joints a box is: with more of it boxes fail, with less joints are outside.
-_LONGER = 1.05
 #: The shortest way between two joints, relative to the length of a path's step: where boxes need to be shorter the
 #: curve is left open.
 _SHORTEST = 1e-7
@@ -343,7 +341,7 @@ class ChainBuilder:
             except ValueError:
                 break
             points = [near(t) for t in (middle - away, middle + away)]
-            sides = [None if point is None else self._proven(point, box.border) for point in points]
+            sides = [proven_point(self.problem, point, box.border) for point in points]
             joints = [side for side in sides if side is not None][:: link.leaves]
             if len(joints) < len(sides):
                 continue
@@ -357,12 +355,7 @@ class ChainBuilder:
     def joint(self, x: Array, direction: Array) -> SolutionCurve | None:
         """The solution near a point, in a box without length across a direction."""
         border = self.across(direction)
-        near = curve_point(self.problem, x, border)
-        return None if near is None else self._proven(near, border)
-
-    def _proven(self, near: CurvePoint, border: Array) -> SolutionCurve | None:
-        found = curve_around(self.problem, near.x, near.direction, border, 0.0, roomy=False)
-        return None if found is None or None in found.statuses else found
+        return proven_point(self.problem, curve_point(self.problem, x, border), border)
 
     def across(self, direction: Array) -> Array:
         """The border in which a direction has the product one, orthogonal to it in units of the nodes."""
@@ -410,28 +403,20 @@ class ChainBuilder:
             x, ahead, after = end.at(0.0).mid, end.box.direction, end.statuses
         else:
             return None
-        start, chord = joint.at(0.0).mid, x - joint.at(0.0).mid
-        across = self._between(joint.box.direction, ahead, chord)
-        length = float(across @ chord)
-        if not length > 0:
-            return None
         changing = [i for i in range(self.problem.p) if joint.statuses[i] != after[i]]
-        middle, half = start + 0.5 * chord, 0.5 * _LONGER * length
-        nodes, steps = tuple(changing), {} if steps is None else steps
-        known = steps.get(nodes)
-        steps[nodes] = corner_steps(self.problem, middle, chord / length, across, half, changing, known)
-        curve = curve_around(self.problem, middle, chord / length, across, half, rho=steps[nodes][0])
+        ends, across = (joint.at(0.0).mid, x), self._between(joint.box.direction, ahead)
+        curve = curve_along(self.problem, ends, across, changing, {} if steps is None else steps, roomy=True)
         if curve is None:
             return None
-        following = self._proven(near, border) if near is not None else end
+        following = end if near is None else proven_point(self.problem, near, border)
         link = None if following is None else link_between(curve, joint, following)
         if following is None or link is None or (former is not None and not goes_on(former, link, joint)):
             return None
         return link, following
 
-    def _between(self, one: Array, other: Array, chord: Array) -> Array:
+    def _between(self, one: Array, other: Array) -> Array:
         """A border for a chord: the directions at both ends go on along it."""
-        total = np.zeros_like(chord)
+        total = np.zeros_like(one)
         for direction in (one, other):
             scaled = direction / self.unit
             total += scaled / np.linalg.norm(scaled)

@@ -103,19 +103,6 @@ def state_of(problem: ContactProblem3D, x: Floats, active: Sequence[Set[int]]) -
 
 
 @dataclass
-class _Place:
-    """A place where a vertex will be."""
-
-    alphas: Bounds
-    x: Floats
-    selections: tuple[Codes, ...]
-    border: bool
-    settled: bool
-    missing: bool = False
-    bounded: bool = False
-
-
-@dataclass
 class _Piece:
     """An arc that will be, and the numbers of its places."""
 
@@ -143,7 +130,10 @@ class CurvedGraph:
     interval: Bounds
     reasons: list[str] = field(default_factory=list)
     left_open: list[Bounds] = field(default_factory=list)
-    _places: list[_Place] = field(default_factory=list)
+    _places: list[Turn] = field(default_factory=list)
+    #: Numbers of places on the border of the interval, and of those where nothing is known.
+    _borders: set[int] = field(default_factory=set)
+    _missing: set[int] = field(default_factory=set)
     _pieces: list[_Piece] = field(default_factory=list)
 
     # -- curves ----------------------------------------------------------------------------------------------------
@@ -236,15 +226,20 @@ class CurvedGraph:
             )
             for number in numbers:
                 # an arc is missing there; that the curve has a solution at the border is not known
-                place = self._places[number]
-                place.settled, place.missing = False, place.border
+                self._places[number] = replace(self._places[number], settled=False)
+                self._missing |= {number} & self._borders
 
     def _limits(self, number: int, inner: Fraction | None) -> Fraction:
         return sum(self._places[number].alphas, Fraction(0)) / 2 if inner is None else inner
 
     def _border(self, run: Run, alpha: Fraction) -> int:
         x = self._values(run).point(float(alpha))
-        self._places.append(_Place((alpha, alpha), x, (run.codes,), border=True, settled=True))
+        self._borders.add(len(self._places))
+        return self._placed(Turn((alpha, alpha), x, (run.codes,), settled=True))
+
+    def _placed(self, turn: Turn) -> int:
+        """The number of a place where a vertex will be, with forces in place of zeta."""
+        self._places.append(turn)
         return len(self._places) - 1
 
     def _turn(self, turn: Turn, *, settled: bool) -> int:
@@ -257,9 +252,7 @@ class CurvedGraph:
                 f"{END_ELSEWHERE}",
                 turn.alphas,
             )
-        x, bounded = unplaced(self.given, turn.x), turn.bounded
-        self._places.append(_Place(alphas, x, turn.selections, border=False, settled=settled, bounded=bounded))
-        return len(self._places) - 1
+        return self._placed(replace(turn, alphas=alphas, x=unplaced(self.given, turn.x), settled=settled))
 
     def _values(self, run: Run) -> CurvedArcValues:
         knots = unplaced(self.given, np.array(run.knots)[:: run.rises])
@@ -270,7 +263,7 @@ class CurvedGraph:
 
     def made(self) -> tuple[list[Vertex], list[Arc]]:
         """Vertices in the order of alpha, and arcs."""
-        there = (k for k, place in enumerate(self._places) if not place.missing)
+        there = (k for k in range(len(self._places)) if k not in self._missing)
         order = sorted(there, key=lambda k: self._places[k].alphas)
         number = {old: new for new, old in enumerate(order)}
         places = [self._places[k] for k in order]
@@ -278,7 +271,10 @@ class CurvedGraph:
         pieces = sorted(self._pieces, key=lambda piece: (number[piece.ends[0]], number[piece.ends[1]]))
         arcs = [self._arc(k, piece, number, exact) for k, piece in enumerate(pieces)]
         sides = sides_of(arcs, len(places))
-        vertices = [self._vertex(k, place, exact[k], sides[k]) for k, place in enumerate(places)]
+        vertices = [
+            self._vertex(k, place, exact[k], sides[k], border=order[k] in self._borders)
+            for k, place in enumerate(places)
+        ]
         for reason, *alphas in unordered(vertices):
             self._leave_open(reason, *alphas)
         return vertices, arcs
@@ -311,7 +307,7 @@ class CurvedGraph:
         slip = tangential(state[1], self.problem.p)
         return tuple(map(space_status, codes, slip))
 
-    def _vertex(self, number: int, place: _Place, exact: EnclosedAlpha, sides: Sides) -> Vertex:
+    def _vertex(self, number: int, place: Turn, exact: EnclosedAlpha, sides: Sides, *, border: bool) -> Vertex:
         active = [frozenset(codes) for codes in zip(*place.selections, strict=True)]
         state = state_of(self.problem, place.x, active if place.settled else [frozenset()] * self.problem.p)
         named = [self._statuses(codes, state) for codes in place.selections]
@@ -323,7 +319,7 @@ class CurvedGraph:
             state,
             names,
             place.selections,
-            border=place.border,
+            border=border,
             settled=place.settled,
             bounded=place.bounded,
         )

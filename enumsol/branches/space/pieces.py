@@ -14,7 +14,7 @@ import numpy as np
 from scipy.optimize import brentq
 
 from enumsol.proof.curve_records import CurveBoxRecord, CurvePart
-from enumsol.search.space.curve_proposals import curve_around, curve_point
+from enumsol.search.space.curve_proposals import curve_along, curve_point, proven_point
 from enumsol.support.deadlines import look, tell
 from enumsol.trusted.space.curve_parts import (
     CurveMotion,
@@ -45,8 +45,8 @@ if TYPE_CHECKING:
 #: best, relative to the part, how much of this that place may be off, by what factor farther others are, and how many.
 _HALVINGS = 12
 _BESIDE, _CLOSE, _FARTHER, _TRIALS = 2.0**-44, 0.25, 8.0, 15
-#: Parts are longer than the way between their ends by this, and wider than their ends are known.
-_LONGER, _ROUNDED = 1.05, 16.0
+#: Parts are wider by this than their ends are known.
+_ROUNDED = 16.0
 
 
 def runs_and_turns(
@@ -218,10 +218,7 @@ class LinkCutter(LinkParts):
 
     def _at(self, start: Place, end: Place, share: float) -> Place | None:
         """The place there, proven."""
-        near = self._near(start, end, share)
-        if near is None:
-            return None
-        return self.place_at(curve_around(self.problem, near.x, near.direction, self.border, 0.0, roomy=False))
+        return self.place_at(proven_point(self.problem, self._near(start, end, share), self.border))
 
     def _middle(self, start: Place, end: Place) -> Place | None:
         # where a part is cut: at the first of these shares where the solution is regular
@@ -280,13 +277,8 @@ class LinkCutter(LinkParts):
 
 def curve_between(problem: AlphaProblem, start: Place, end: Place, border: Array) -> SolutionCurve | None:
     """A curve in a box of its own that has two places; None where none is proven to have them."""
-    chord = end.x - start.x
-    length = float(border @ chord)
-    if not length > 0:
-        return None
     changing = [i for i, pair in enumerate(zip(start.codes, end.codes, strict=True)) if pair[0] != pair[1]]
-    middle, half = start.x + 0.5 * chord, 0.5 * _LONGER * length
-    curve = curve_around(problem, middle, chord / length, border, half, changing, roomy=False)
+    curve = curve_along(problem, (start.x, end.x), border, changing)
     if curve is None:
         return None
     # a curve that only alpha changes along needs a box of the size of rounding errors

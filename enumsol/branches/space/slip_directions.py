@@ -10,7 +10,7 @@ import numpy as np
 from enumsol.arithmetic.balls import Ball, hull
 from enumsol.branches.space.make_curved import CurvedArcValues
 from enumsol.branches.space.pieces import curve_between
-from enumsol.search.space.curve_proposals import border_of_zeta, curve_around, curve_point, placed
+from enumsol.search.space.curve_proposals import border_of_zeta, curve_along, curve_point, placed, proven_point
 from enumsol.support.deadlines import look
 from enumsol.trusted.motions_of_body import direction
 from enumsol.trusted.space.curve_parts import CurveMotion, Place
@@ -23,8 +23,6 @@ if TYPE_CHECKING:
     from enumsol.support.array_types import Floats
     from enumsol.trusted.space.solution_curve import AlphaProblem
 
-#: Boxes are longer by this than the ranges of alpha that they are for.
-_LONGER = 1.05
 #: Shares of the ways to the knots on both sides of a vertex at which a box over it ends: a longer one holds more
 #: directions, and one that is too short is not proven, since rounding errors are as large.
 _SHARES = (0.0, 2.0**-32, 2.0**-24, 2.0**-16, 2.0**-8, 1.0)
@@ -156,11 +154,8 @@ class SlipDirections:
 
     def _place(self, x: Floats, border: Floats) -> Place | None:
         """A proven point of the curve near x."""
-        near = curve_point(self._given, x, border)
-        found = None if near is None else curve_around(self._given, near.x, near.direction, border, 0.0, roomy=False)
-        if found is None or None in found.statuses:
-            return None
-        return Place(found, CurveMotion(self._given, found, border))
+        found = proven_point(self._given, curve_point(self._given, x, border), border)
+        return None if found is None else Place(found, CurveMotion(self._given, found, border))
 
     def _shorter(self, part: _Part, k: int, low: float, high: float) -> SolutionCurve | None:
         """A curve within a part that has all of its solutions between two alphas; None where none is proven."""
@@ -169,13 +164,12 @@ class SlipDirections:
         start, whole, end = part
         border = self._borders[k]
         first, last = (placed(self._given, self._values.point(alpha)) for alpha in (low, high))
-        length = float(border @ (last - first))
-        if not length > 0:
+        curve = curve_along(self._given, (first, last), border, ())
+        if curve is None:
             return None
-        half = 0.5 * _LONGER * length
-        curve = curve_around(self._given, 0.5 * (first + last), (last - first) / length, border, half, roomy=False)
         # boxes are convex
-        if curve is None or not (lies_in(whole.box, curve.at(-half)) and lies_in(whole.box, curve.at(half))):
+        half = curve.box.half
+        if not (lies_in(whole.box, curve.at(-half)) and lies_in(whole.box, curve.at(half))):
             return None
         # its middle is on the arc, on which alpha rises from below the range to above it
         middle = curve.at(0.0)

@@ -19,9 +19,9 @@ from enumsol.branches.space.pieces import runs_and_turns
 from enumsol.branches.ways import Made
 from enumsol.condensation.enclosure import NotEnclosedError, enclosure_of
 from enumsol.model.sectors import SECTORS, is_sector, nearest, run_of
-from enumsol.model.statuses import FRICTIONLESS, OPEN, SLIP_MINUS, SLIP_PLUS, STICK
-from enumsol.proof.curve_records import CurveBoxRecord, CutPiece
+from enumsol.proof.curve_records import CurveBoxRecord
 from enumsol.proof.leaves import UndecidedRecord
+from enumsol.proof.records import CutPiece
 from enumsol.proof.writer import ProofWriter, unit_exponents
 from enumsol.roots.enumerate import enumerate_roots
 from enumsol.roots.root_set import RigidBound, RootSet, SearchStats, Undecided
@@ -29,12 +29,13 @@ from enumsol.roots.space_roots import SpaceEnumeration
 from enumsol.search.outcome import Stop, StopReason
 from enumsol.search.space.known_curves import Curves, joined
 from enumsol.search.space.piece_tree import OpenLeaf, PieceTree, SpreadPieces
-from enumsol.search.space.space_setup import SpaceSolvers
+from enumsol.search.space.space_search import SpaceSolvers
 from enumsol.support.deadlines import TimeOverError, look, remaining, within
 from enumsol.support.messages import counted
 from enumsol.trusted.space.curve_parts import Run, arcs_over
 from enumsol.trusted.space.curve_runs import apart
 from enumsol.trusted.space.leaves import SpaceRoot, distinct_roots, settle
+from enumsol.trusted.space.sector_rows import leaf_code
 from enumsol.trusted.space.solution_curve import AlphaProblem
 
 if TYPE_CHECKING:
@@ -327,9 +328,9 @@ class ByCurves:
                 arcs, open_parts = arcs + inside, open_parts + len(gaps_between)
         writer.write({"tree": True})
         leaves, gaps = 0, len(self.ends) + open_parts
+        no_curve = UndecidedRecord("solutions there lie on no curve that is known")
         for record in self.records:
-            # what the record of an open leaf says
-            written = UndecidedRecord(_NO_CURVE) if isinstance(record, OpenLeaf) else record
+            written = no_curve if isinstance(record, OpenLeaf) else record
             gaps += written is not record
             leaves += written.kind not in ("p", "b")
             writer.write(written.write())
@@ -345,7 +346,6 @@ def _ends_of(parts: Sequence[Run | Turn]) -> tuple[Bounds | None, Bounds | None]
     return first.start if isinstance(first, Run) else first.alphas, last.end if isinstance(last, Run) else last.alphas
 
 
-_NO_CURVE = "solutions there lie on no curve that is known"
 _NOT_PROVEN = "the root of an arc could not be proven at this alpha"
 
 
@@ -419,17 +419,11 @@ def root_near(system: EnclosedSpace, codes: Codes, forces: Floats) -> tuple[Code
 
 def _leaves(system: EnclosedSpace, i: int, code: int, forces: Floats, level: int) -> Iterable[int]:
     """Codes of a node in a leaf: of a node that slips, the sectors of a level around the direction of its friction."""
-    if code == OPEN:
-        return (OPEN,)
-    axes = np.flatnonzero(system.tau[i] >= 0)
-    if not len(axes):
-        return (FRICTIONLESS,)
-    if code == STICK:
-        return (STICK,)
     p = len(system.tau)
-    tau = forces[p:].reshape(2, p)[axes, i] / system.F[i, axes]
-    if len(axes) == 1:
-        return (SLIP_PLUS if tau[0] > 0 else SLIP_MINUS,)
+    tau = forces[p:].reshape(2, p)[:, i] / np.where(system.F[i] > 0, system.F[i], 1.0)
+    code = leaf_code(code, system.tau[i], tau, level)
+    if code < SECTORS:
+        return (code,)
     begin = nearest(float(tau[0]), float(tau[1]), level)
     first = 1 << level
     before = first + (begin - first - 1) % first

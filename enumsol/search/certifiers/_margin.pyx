@@ -13,7 +13,7 @@ cdef extern from "_dense.h" nogil:
 import numpy as np
 
 from enumsol.arithmetic.balls import ROOT_TINY, SAFE, TINY, UNIT, gamma
-from enumsol.trusted.energy_bounds import EnergyForm
+from enumsol.trusted.quadratic_forms import QuadraticForm
 from enumsol.trusted.over_interval import interval_row_tables
 from enumsol.trusted.status_rows import FORBIDDEN, NONNEGATIVE
 
@@ -132,7 +132,7 @@ cdef class Margins(Multipliers):
         if bound > 0.0 or not most > 0.0:
             return bound
         if end not in self.sharper:
-            self.sharper[end] = FormMargins(EnergyForm.of(self.ends[end]), 2.0)
+            self.sharper[end] = FormMargins(QuadraticForm.energy(self.ends[end]), 2.0)
         form = self.sharper[end]
         form.work[:3, :] = self.work[:3, :]
         form.work[6, :] = self.work[6, :]

@@ -32,10 +32,6 @@ if TYPE_CHECKING:
 
 #: Rounding the multipliers hardly lowers bounds above this: for a wedge, 10 of 28,196 bounds are halved.
 _CLEAR = 1e-6
-#: Weight of multipliers that are zero, relative to the largest: they change only where the others cannot do it.
-_SPARE = 2.0**-20
-#: How often multipliers that would change their sign are set to zero, and what is left is balanced again.
-_BALANCES = 8
 
 
 def in_balance(system: EnclosedSystem, codes: Codes, rows: Indices, values: Floats) -> tuple[Indices, Floats]:
@@ -51,8 +47,10 @@ def in_balance(system: EnclosedSystem, codes: Codes, rows: Indices, values: Floa
     table = np.bincount(rows, values, minlength=signs.size).reshape(-1, p)
     y = np.concatenate([table[PENETRATION], table[SLIP_BACKWARD] - table[SLIP_FORWARD]])
     size = np.abs(y)
-    weight = np.where(low | high, size + _SPARE * np.max(size), 0.0)
-    for _ in range(_BALANCES):
+    # multipliers that are zero change only where the others cannot do it
+    weight = np.where(low | high, size + 2.0**-20 * np.max(size), 0.0)
+    # multipliers that would change their sign are set to zero, and what is left is balanced again
+    for _ in range(8):
         step = np.linalg.lstsq((G * weight) @ G.T, h - G @ y, rcond=1e-13)[0]
         y = y + weight * (step @ G)
         wrong = np.where(y < 0, ~low, ~high) & (y != 0)

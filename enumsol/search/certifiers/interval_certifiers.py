@@ -9,7 +9,7 @@ from enumsol.condensation.enclosure import CondensedEnclosure, NotEnclosedError,
 from enumsol.condensation.exact import ExactCondensed, ExactSystem
 from enumsol.model.statuses import RowKind
 from enumsol.relaxation.active_set import IntervalRowKind, IntervalSystem, interval_rows
-from enumsol.relaxation.imposed_rows import with_implied
+from enumsol.relaxation.engine import with_implied
 from enumsol.search.certifiers.protocol import FORM_ERRORS, energy_margin
 from enumsol.search.certifiers.rational_certifier import accepted, energy_bound_positive
 from enumsol.search.subintervals import IntervalCertifier, Piece

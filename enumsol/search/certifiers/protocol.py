@@ -14,6 +14,7 @@ import numpy as np
 
 from enumsol.proof.leaves import UndecidedRecord, Unloaded
 from enumsol.proof.records import Branching, Record
+from enumsol.selections.solution import VertexLimitError
 from enumsol.trusted.exclusion import exclusion_margin
 from enumsol.trusted.over_interval import EnclosedPiece
 
@@ -23,8 +24,8 @@ if TYPE_CHECKING:
     from enumsol.condensation.enclosure import EnclosedSystem
     from enumsol.proof.records import DeclaredForm
     from enumsol.proof.writer import Part, Recorder
-    from enumsol.search.fathoming_in_contact import LoneProposal
-    from enumsol.search.reduction import Point, Proposal
+    from enumsol.search.reduction import LoneProposal, Point, Proposal
+    from enumsol.selections.solution import SelectionSolution, SelectionSolver
     from enumsol.support.array_types import Codes, Floats, Indices
     from enumsol.trusted.quadratic_forms import EnclosedForm
 
@@ -268,6 +269,14 @@ class Certifier(ABC):
         if self.writes:
             self._leaves += 1
             self.recorder.write(leaf.write())
+
+
+def solve_or_open(solver: SelectionSolver, codes: Codes) -> SelectionSolution | UndecidedPart | None:
+    """The solver's answer; a polytope with too many candidate vertices leaves the selection open."""
+    try:
+        return solver.solve(codes)
+    except VertexLimitError as error:
+        return UndecidedPart(codes, str(error), "perturb the load or the friction coefficient", examined=True)
 
 
 #: How often the error bound of an exclusion with a form is subtracted where a proof is written.

@@ -11,10 +11,9 @@ from flint import fmpq, fmpq_mat
 
 from enumsol.arithmetic.rationals import rational
 from enumsol.model.statuses import CONDITIONS, OPEN, SLIDING, RowKind
-from enumsol.relaxation.imposed_rows import INEQUALITY, imposed_rows
-from enumsol.search.certifiers.float_certifier import solve_or_open
-from enumsol.search.certifiers.protocol import Bound, Certifier, UndecidedPart
-from enumsol.search.fathoming import holds_below, propose
+from enumsol.relaxation.engine import INEQUALITY, imposed_rows
+from enumsol.search.certifiers.protocol import Bound, Certifier, UndecidedPart, solve_or_open
+from enumsol.search.fathoming import holds_below
 from enumsol.selections.solution import SelectionSolution
 from enumsol.support.deadlines import look
 from enumsol.trusted.uniqueness import only_solution
@@ -113,15 +112,7 @@ class ExactCertifier(Certifier):
         return [root] if isinstance(root, SelectionSolution) else None
 
     def closed(self, codes: Codes, proposal: Proposal | None, near: Point) -> list[SelectionSolution] | None:
-        """The solutions below a partial assignment, none or one, if it can hold one only; None if not proven."""
-        found = self._closing(codes, proposal)
-        return None if found is None else found[1]
-
-    def closing(self, codes: Codes, near: Point) -> tuple[Proposal, list[SelectionSolution]] | None:
-        """Proposal that closes a subtree, and the solutions in it, sought near a point (theory, section 6.11)."""
-        return self._closing(codes, propose(self._scaled, codes, near, exactly=True))
-
-    def _closing(self, codes: Codes, proposal: Proposal | None) -> tuple[Proposal, list[SelectionSolution]] | None:
+        """The solutions below a partial assignment, none or one (theory, section 6.11); None if not proven."""
         if self._exclusions is None or proposal is None or proposal.weights is None:
             return None
         solver, selection = self._selections, proposal.selection
@@ -138,13 +129,12 @@ class ExactCertifier(Certifier):
         if not sign:
             return None
         if not holds_below(codes, active):
-            return proposal, []
+            return []
         fixed = [i for i in range(solver.p) if i not in proposal.free]
         sides = {i: SLIDING[code] for i, code in proposal.sliding.items()}
         index = sign if all(active[i] <= set(sides.get(i, (selection[i],))) for i in fixed) else None
         strict = all(len(held) == 1 for held in active)
-        solution = SelectionSolution(proposal.selection, (point,), 0, determinant, strict, exact=True, index=index)
-        return proposal, [solution]
+        return [SelectionSolution(proposal.selection, (point,), 0, determinant, strict, exact=True, index=index)]
 
     def _fails(self, proposal: Proposal) -> bool:
         """True if many digits show that the solution of a proposal breaks a condition at a node that is free."""

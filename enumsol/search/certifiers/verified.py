@@ -7,7 +7,7 @@ problem is small enough, otherwise the selection is left undecided with the reas
 from __future__ import annotations
 
 from dataclasses import replace
-from functools import partial
+from functools import cache, partial
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -33,8 +33,7 @@ if TYPE_CHECKING:
     from enumsol.proof.writer import Recorder
     from enumsol.search.certifiers.exclusions import Exclusions
     from enumsol.search.certifiers.rational_certifier import ExactCertifier
-    from enumsol.search.fathoming_in_contact import LoneProposal
-    from enumsol.search.reduction import Point, Proposal
+    from enumsol.search.reduction import LoneProposal, Point, Proposal
     from enumsol.search.reference_closer import OnlyRoot
     from enumsol.support.array_types import Codes, Floats, Indices
     from enumsol.trusted.quadratic_forms import EnclosedForm
@@ -90,7 +89,7 @@ class VerifiedCertifier(protocol.Certifier):
         self._exact = exact
         self._node_ids = node_ids
         self._escalations = protocol.Escalations()
-        self._form_margins: dict[EnclosedForm, protocol.Margin] = {}
+        self._margin_of = cache(partial(protocol.margin_of_form, errors=protocol.FORM_ERRORS))
         #: Selections of the roots found in rationals.
         self._known: list[Codes] = []
 
@@ -120,10 +119,7 @@ class VerifiedCertifier(protocol.Certifier):
 
     def _excluded_by(self, form: EnclosedForm, codes: Codes, rows: Indices, values: Floats) -> bool:
         """True if multipliers exclude the assignment with a form in place of the energy."""
-        margin = self._form_margins.get(form)
-        if margin is None:
-            margin = self._form_margins[form] = protocol.margin_of_form(form, protocol.FORM_ERRORS)
-        kept = proven(margin, codes, rows, values)
+        kept = proven(self._margin_of(form), codes, rows, values)
         if kept is None:
             self._escalations.refined += 1
             return False
@@ -204,12 +200,14 @@ class VerifiedCertifier(protocol.Certifier):
         if proposal is not None and ball is not None and (told or (proposal.strict and not ball.is_wide)):
             return self._closed_by(proposal, ball)
         certifier = None if proposal is not None and proposal.hopeless else self._exact()
-        if certifier is not None and (exact := certifier.closing(codes, near)) is not None:
-            closing, solutions = exact
-            self._known += [solution.codes for solution in solutions]
-            self._escalations.rationals += 1
-            self._leaf(leaves.Closed(closing.selection, closing.free, closing.numbers, len(solutions)))
-            return solutions
+        if certifier is not None:
+            closing = propose(self._scaled, codes, near, exactly=True)
+            solutions = certifier.closed(codes, closing, near)
+            if closing is not None and solutions is not None:
+                self._known += [solution.codes for solution in solutions]
+                self._escalations.rationals += 1
+                self._leaf(leaves.Closed(closing.selection, closing.free, closing.numbers, len(solutions)))
+                return solutions
         found = None if proposal is None or ball is None or ball.is_wide else self._closed_by(proposal, ball)
         if found and proposal is not None and certifier is not None:
             exactly = certifier.solution_near(proposal)

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from enumsol.arithmetic.balls import TINY, UNIT, Ball
+from enumsol.search.space.space_newton import projected
 from enumsol.trusted.space.solution_curve import CurveBox, curve_of, map_around
 
 if TYPE_CHECKING:
@@ -36,6 +37,35 @@ _ROOM = 5.0
 #: how much wider in a shorter box with those of a longer one.
 _TURNED, _AS_WIDE = 0.5, 1.05
 _FACTORS = (1.0, 4.0, 16.0, 64.0, 256.0, 0.25, 0.0625, 0.015625)
+
+
+#: How much longer a box is than the way between the points that it is to have: with more of it boxes fail, with less
+#: points are outside.
+_LONGER = 1.05
+
+
+def curve_along(
+    problem: AlphaProblem,
+    ends: tuple[Floats, Floats],
+    border: Floats,
+    changing: Sequence[int],
+    steps: dict[tuple[int, ...], tuple[Floats, float]] | None = None,
+    *,
+    roomy: bool = False,
+) -> SolutionCurve | None:
+    """The curve in a box that has two points, as of ``curve_around``; None where the second is not ahead.
+
+    ``steps``: those of the natural map at a corner, by the nodes that change, put in when they are known.
+    """
+    chord = ends[1] - ends[0]
+    length = float(border @ chord)
+    if not length > 0:
+        return None
+    at, nodes, rho = (ends[0] + 0.5 * chord, chord / length, border, 0.5 * _LONGER * length), tuple(changing), None
+    if steps is not None:
+        steps[nodes] = corner_steps(problem, *at, changing, steps.get(nodes))
+        rho = steps[nodes][0]
+    return curve_around(problem, *at, changing, rho=rho, roomy=roomy)
 
 
 def curve_around(
@@ -126,13 +156,17 @@ def curve_point(problem: AlphaProblem, x: Floats, border: Floats) -> CurvePoint 
     x, row, asked = x / unit, border * unit, np.zeros((m + 1, 2))
     asked[m, 1] = 1.0
     moves = np.vstack([2.0 * problem.part.mid - np.eye(m, m + 1), np.eye(1, m + 1, m)])
+    at = np.column_stack([np.arange(problem.p), problem.places, np.full(problem.p, m)])
+    has, kept = at[:, :3] >= 0, np.arange(3 * problem.p, m)
     with np.errstate(all="ignore"):
         for _ in range(_STEPS):
             y = problem.part.mid @ x + problem.offset.mid
             z = np.append(2.0 * y - x[:m], x[m])
-            projected, D = _projected(problem, z)
-            asked[:m, 0] = projected - y
-            B = np.vstack([problem.part.mid - D @ moves, row])
+            P, D = projected(problem.places, problem.F0 + z[m] * problem.F1, problem.F1, z)
+            asked[:m, 0] = P - y
+            B = np.vstack([problem.part.mid, row])
+            B[kept] -= moves[kept]
+            B[at[:, :3][has]] -= (D @ moves[at])[has]
             try:
                 found = np.linalg.solve(B, asked)
             except np.linalg.LinAlgError:
@@ -144,29 +178,10 @@ def curve_point(problem: AlphaProblem, x: Floats, border: Floats) -> CurvePoint 
     return CurvePoint(x * unit, found[:, 1] * unit, statuses, z) if np.all(np.isfinite(found)) else None
 
 
-def _projected(problem: AlphaProblem, z: Floats) -> tuple[Floats, Floats]:
-    """P of arguments (z, alpha) and a derivative of it, (m,) and (m, m + 1), in floats."""
-    p, m = problem.p, len(z) - 1
-    has, nodes, F = problem.places >= 0, np.arange(p), problem.F0 + z[m] * problem.F1
-    normal, tangent = np.maximum(z[:p], 0.0), np.where(has, z[problem.places], 0.0)
-    most, length = F * normal, np.linalg.norm(tangent, axis=1)
-    touches = z[:p] > 0
-    sticks = touches & (length <= most)
-    ratio = np.where(sticks, 1.0, most / np.where(length > 0, length, 1.0))
-    e = np.where(sticks, 0.0, 1.0)[:, None] * tangent / np.where(length > 0, length, 1.0)[:, None]
-    P, D, kept = np.zeros(m), np.zeros((m, m + 1)), np.arange(3 * p, m)
-    P[kept], D[kept, kept] = z[kept], 1.0
-    P[:p], D[nodes, nodes] = normal, touches
-    for k in (0, 1):
-        own = nodes[has[:, k]]
-        at = problem.places[own, k]
-        P[at] = ratio[own] * tangent[own, k]
-        D[at, own] = np.where(touches, F, 0.0)[own] * e[own, k]
-        D[at, m] = (problem.F1 * normal)[own] * e[own, k]
-        for j in (0, 1):
-            both = own[has[own, j]]
-            D[problem.places[both, k], problem.places[both, j]] = ratio[both] * ((k == j) - e[both, k] * e[both, j])
-    return P, D
+def proven_point(problem: AlphaProblem, near: CurvePoint | None, border: Floats) -> SolutionCurve | None:
+    """The solution at a point, in a box without length, if all statuses hold strictly there; None where not proven."""
+    found = None if near is None else curve_around(problem, near.x, near.direction, border, 0.0, roomy=False)
+    return None if found is None or None in found.statuses else found
 
 
 def _contraction(near: NaturalMap, *, roomy: bool) -> Contraction | None:

@@ -14,11 +14,10 @@ import numpy as np
 
 from enumsol.arithmetic.balls import Ball
 from enumsol.arithmetic.rationals import simplest
-from enumsol.model.sectors import DEEPEST, SECTORS, level_of, parts_around, places, span, width_of
+from enumsol.model.sectors import DEEPEST, SECTORS, holding, level_of, parts_around, places, span, width_of
 from enumsol.proof.curve_records import OnCurve, ThroughCurveBox
 from enumsol.proof.leaves import NoRoot
 from enumsol.search.space.curve_proposals import curve_point, placed, unplaced
-from enumsol.search.space.piece_multipliers import unbalanced
 from enumsol.search.space.space_fathoming import without_sectors
 from enumsol.trusted.space.curve_runs import KnownCurve
 from enumsol.trusted.space.pieces import lie_along
@@ -31,8 +30,7 @@ if TYPE_CHECKING:
 
     from enumsol.condensation.enclosure import CondensedEnclosure
     from enumsol.proof.records import Record
-    from enumsol.search.space.piece_certificates import ExaminedPiece
-    from enumsol.search.space.piece_multipliers import AlphaPoint
+    from enumsol.search.space.piece_proposals import AlphaPoint, ExaminedPiece
     from enumsol.support.array_types import Codes, Floats, Mask
     from enumsol.trusted.space.curve_runs import CurveChain, CurveParts
     from enumsol.trusted.space.leaves import Open, SpaceRoot
@@ -253,8 +251,7 @@ def _narrow(problem: AlphaProblem, x: Floats, codes: Codes, nodes: Sequence[int]
     y = (unplaced(problem, x)[:-1] / problem.ratio.mid)[p : 3 * p].reshape(2, p)
     for i in nodes:
         # sectors of this level around the point, or narrower ones
-        up = DEEPEST + 2 - max(12, level_of(codes[i] - SECTORS))
-        leaf[i] = SECTORS + (1 << (DEEPEST + 2 - up)) + (int(places(y[:, i])) >> up)
+        leaf[i] = SECTORS + holding(y[:, i], max(12, level_of(codes[i] - SECTORS)))
     return tuple(leaf)
 
 
@@ -284,7 +281,7 @@ def settled(
     """The record of a leaf that has no root, or none that is not known; ``found`` is what it holds over a piece."""
     if found is None:
         return NoRoot()
-    if (without := unbalanced(at.piece, codes)) is not None:
+    if (without := at.unbalanced(codes)) is not None:
         return without
     run = curves.run(piece, found)
     return _on_arc(curves, at, codes, piece, found) if run is None else OnCurve(*run)

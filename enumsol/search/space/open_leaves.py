@@ -12,13 +12,13 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from enumsol.arithmetic.balls import nearly_singular
-from enumsol.search.space.box_proposals import box_around
 from enumsol.search.space.curve_proposals import ERRORS
 from enumsol.search.space.space_fathoming import NEAR, Point
 from enumsol.search.space.space_newton import Isotropic
-from enumsol.trusted.space.boxed_solution import BoxedSolution, is_inside, solution_in_box
+from enumsol.trusted.space.boxed_solution import Box, BoxedSolution, BoxProblem, is_inside, solution_in_box
 from enumsol.trusted.space.leaf_equations import with_free_bounds
 from enumsol.trusted.space.leaves import Open, settle
+from enumsol.trusted.space.space_uniqueness import moderate_units
 from enumsol.trusted.space.turning import turned_by
 
 if TYPE_CHECKING:
@@ -177,20 +177,64 @@ class KnownBoxes:
     def _sought(self, y: Floats, *, halved: bool) -> BoxedSolution | None:
         """A new solution near a point, in a box of its own; near a leaf to be ``halved``, one that no leaf settles."""
         with np.errstate(all="ignore"):
-            near = self._problem.near(y, self._system)
-            if near is None:
+            found, unit = self._problem.near(y * self._system.unit), self._system.unit
+            if found is None:
                 return None
+            near = found / unit
             # nearer ones are the same solution
             size = 1e-6 * float(np.max(np.abs(near)))
             if any(np.max(np.abs(near - other)) <= size for other in self._passed):
                 return None
-            point = Point.of(self._system, self._problem, self._problem.by_node(near, self._system))
+            point = Point.of(self._system, self._problem, near * unit)
             self._passed.append(near)
             # a regular root is settled by a leaf that is narrow enough, unless rounding hides it
             if halved and point.slack > NEAR and not isinstance(settle(self._enclosed, point.codes), Open):
                 return None
             box = box_around(self._enclosed, near)
-        found = None if box is None else solution_in_box(self._enclosed, box, ERRORS)
-        if found is not None:
-            self._found.append(found)
-        return found
+        proven = None if box is None else solution_in_box(self._enclosed, box, ERRORS)
+        if proven is not None:
+            self._found.append(proven)
+        return proven
+
+
+# -- boxes that may hold one solution (theory, section 12.7) -----------------------------------------------------------
+
+#: Size of the box that is tried first, by the forces that would hold one node alone, and how often it is halved.
+_FIRST, _HALVINGS = 1.0, 24
+#: Where rho is tried between compliance and stiffness, as an exponent of the latter.
+_SHARES = 0.5, 1.0
+
+
+def box_around(system: EnclosedSpace, y: Floats) -> Box | None:
+    """A box, as large as is found, that seems to hold one solution, near scaled forces y."""
+    if not moderate_units(system.unit) or not np.all(np.isfinite(y)):
+        return None
+    with np.errstate(all="ignore"):
+        for rho in proposed_rho(system):
+            problem = BoxProblem.of(system, rho)
+            centre = None if problem is None else problem.zero(y * system.unit)
+            if problem is None or centre is None:
+                continue
+            near = problem.around(centre)
+            radius = np.full(len(y), _FIRST * float(np.max(np.abs(problem.g.mid) / np.diagonal(problem.S.mid))))
+            for _ in range(_HALVINGS):
+                if near.mapped(radius, 2.0) is not None:
+                    return Box.of(system, centre / system.unit, radius / system.unit, rho)
+                radius *= 0.5
+    return None
+
+
+def proposed_rho(system: EnclosedSpace) -> list[Floats]:
+    """rho, one for lambda_n and one for tau of every node, scaled: between 1 / S_ii and the stiffness S^-1_ii."""
+    soft = system.unit**2 / np.diagonal(system.S)
+    try:
+        stiff = np.diagonal(np.linalg.inv(system.S)) * system.unit**2
+    except np.linalg.LinAlgError:
+        return []
+    found = []
+    for share in _SHARES:
+        rho = soft ** (1.0 - share) * stiff**share
+        for t in system.tau:
+            rho[t[t >= 0]] = np.min(rho[t[t >= 0]], initial=np.inf)
+        found.append(rho / system.unit**2)
+    return found

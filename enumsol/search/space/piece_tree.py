@@ -14,16 +14,16 @@ from enumsol.arithmetic.rationals import simplest
 from enumsol.condensation.space_condensed import AlphaSpace
 from enumsol.model.sectors import DEEPEST, SECTORS, level_of, width_level
 from enumsol.model.statuses import CONTACT, UNDECIDED
-from enumsol.proof.curve_records import CutPiece, OnCurve
+from enumsol.proof.curve_records import OnCurve
 from enumsol.proof.leaves import Excluded
-from enumsol.proof.records import Branching
+from enumsol.proof.records import Branching, CutPiece
 from enumsol.relaxation.engine import PRUNE_MARGIN
 from enumsol.search.outcome import StopReason
 from enumsol.search.parts import Answer, Spread
+from enumsol.search.space.curve_proposals import ERRORS
 from enumsol.search.space.known_curves import Curves, CurveWantedError, around_curves, middle_of, settled, through
 from enumsol.search.space.open_leaves import is_swept
-from enumsol.search.space.piece_certificates import ERRORS, ExaminedPiece, Passage, runs_over
-from enumsol.search.space.piece_multipliers import COUNTED, AlphaPoint, exclusion, unbalanced
+from enumsol.search.space.piece_proposals import THETA, AlphaPoint, ExaminedPiece, Passage, exclusion, runs_over
 from enumsol.search.space.space_fathoming import without_sectors
 from enumsol.search.tree import depth_first
 from enumsol.support.deadlines import TimeOverError, look, remaining
@@ -279,9 +279,9 @@ class PieceTree:
         """An assignment that one alpha excludes: over all of the piece, if possible, or it is cut or branched."""
         point, relaxation = parent
         rows, values = point.multipliers(relaxation)
-        if at.piece.margin(codes, rows, (values, values), COUNTED) > 0:
+        if at.piece.margin(codes, rows, (values, values), ERRORS) > 0:
             return Excluded(rows, np.stack([values, values])), []
-        if (without := unbalanced(at.piece, codes)) is not None:
+        if (without := at.unbalanced(codes)) is not None:
             return without, []
         ends = self._ends(at, codes)
         possible = [(end, other) for end, other in ends if not _is_excluded(other)]
@@ -390,12 +390,12 @@ class PieceTree:
             return None
         (passage,) = passages
         known, run = self.curves.known[passage.curve], passage.run
-        numbers = at.proposals.numbers(statuses, passage.parts)
-        if numbers is not None and piece.lies_on(known, run, statuses, numbers, ERRORS):
+        numbers = at.numbers(statuses, passage.parts)
+        if numbers is not None and piece.lies_on(known, run, statuses, numbers, THETA):
             before = sum(len(other.chain.links) for other in self.curves.known[: passage.curve])
             return OnCurve(before + run.first, before + run.last, numbers), []
         longer = self._is_longer(piece, _ALONE)
-        if longer and at.proposals.is_hopeful(statuses, known.over(run, piece.middle, piece.middle)):
+        if longer and at.is_hopeful(statuses, known.over(run, piece.middle, piece.middle)):
             # a leaf may be decided over a longer piece
             done = None if {CONTACT, UNDECIDED} & set(codes) else self._leaf(at, codes)
             return self._halved(at, codes) if done is None or isinstance(done[0], OpenLeaf) else done

@@ -13,11 +13,12 @@ import numpy as np
 import scipy.linalg
 
 from enumsol.arithmetic.balls import factor_above
-from enumsol.model.sectors import SECTORS, nearest, start_of
-from enumsol.model.statuses import CONTACT, FRICTIONLESS, OPEN, SLIP_MINUS, SLIP_PLUS, STICK, UNDECIDED
-from enumsol.search.closing import TreeCloser
+from enumsol.model.sectors import SECTORS
+from enumsol.model.statuses import CONTACT, OPEN, STICK, UNDECIDED
+from enumsol.search.nodes import TreeCloser
 from enumsol.search.space.space_newton import Isotropic
 from enumsol.support.deadlines import look
+from enumsol.trusted.space.sector_rows import leaf_code
 from enumsol.trusted.space.space_uniqueness import equations, moderate_units
 
 if TYPE_CHECKING:
@@ -137,7 +138,7 @@ class SpaceCloser(TreeCloser):
 
 
 def solved(system: SpaceSystem, near: Floats | None = None) -> tuple[Point, Floats] | None:
-    """A solution in floats, and its forces (p, 3) in isotropic variables, near those of another one; or None."""
+    """A solution in floats, and its forces in isotropic variables, near those of another one; or None."""
     if not moderate_units(system.unit):
         return None
     problem = Isotropic.of(system)
@@ -175,9 +176,10 @@ class Point:
 
     @classmethod
     def of(cls, system: SpaceSystem, problem: Isotropic, y: Floats) -> Point:
-        """The solution of forces y, (p, 3), which solve the problem up to rounding."""
-        w = problem.displacements(y)
-        n, gap, tau, v = np.maximum(y[:, 0], 0.0), np.maximum(-w[:, 0], 0.0), y[:, 1:], w[:, 1:]
+        """The solution of forces y, (m,), which solve the problem up to rounding."""
+        p, w = system.p, problem.displacements(y)
+        n, gap = np.maximum(y[:p], 0.0), np.maximum(-w[:p], 0.0)
+        tau, v = system.tangential(y), system.tangential(w)
         rubs, size, length = np.any(system.tau >= 0, axis=1), np.linalg.norm(v, axis=1), np.linalg.norm(tau, axis=1)
         loaded, slip, room = n > NEAR, size * system.slip_scale, (n - length) * system.disc_scale
         slides = rubs & (slip > NEAR)
@@ -187,22 +189,12 @@ class Point:
         theta = np.where(loaded[:, None], tau, v) / divisor[:, None]
         held = rubs & (slip <= room)
         slack = np.where(n < gap, gap, np.where(rubs, np.minimum(n, np.where(held, room, slip)), n))
-        codes = tuple(cls._code(system, i, tau[i], bool(n[i] >= gap[i]), bool(held[i])) for i in range(len(n)))
+        status = np.where(n < gap, OPEN, np.where(held, STICK, CONTACT)).tolist()
+        codes = tuple(leaf_code(*node, _LEVEL) for node in zip(status, system.tau.tolist(), tau.tolist(), strict=True))
         apart = ~loaded & (gap > NEAR)
         wide = rubs & ~loaded & ~apart & ~slides
         open_gap = np.where(apart, gap, 0.0)
         return cls(system, np.where(loaded, n, 0.0), open_gap, v, theta, wide, codes, float(np.min(slack)))
-
-    @staticmethod
-    def _code(system: SpaceSystem, i: int, direction: Floats, loaded: bool, held: bool) -> int:
-        axes = np.flatnonzero(system.tau[i] >= 0)
-        if not loaded:
-            return OPEN
-        if held or not len(axes):
-            return STICK if len(axes) else FRICTIONLESS
-        if len(axes) == 1:
-            return SLIP_PLUS if direction[axes[0]] > 0 else SLIP_MINUS
-        return SECTORS + _sector(direction, _LEVEL)
 
     def leaf(self, level: int) -> Codes:
         """``codes`` with sectors of a level that hold those there."""
@@ -237,17 +229,6 @@ class Point:
 def _allows(code: int, final: int) -> bool:
     """True if a node of a (partial) status, which is not a sector, may have a final one."""
     return code in (UNDECIDED, final) or (code == CONTACT and final != OPEN)
-
-
-def _sector(direction: Floats, level: int) -> int:
-    """The sector of a level that holds a direction."""
-    x, y = direction.tolist()
-    number = nearest(x, y, level)
-    a, b = map(float, start_of(number))
-    if a * y - b * x >= 0:
-        return number
-    first = 1 << level
-    return first + (number - first - 1) % first
 
 
 class DefiniteForm:
@@ -289,7 +270,7 @@ class DefiniteForm:
         self._system, self._S, self._open, self._off = system, system.S, opened, off
         self._discs = np.ones(system.p) if discs is None else discs
         tau = system.tau
-        self._unit = np.where(tau >= 0, system.unit[tau], 1.0)
+        self._unit = system.tau_units
         self._turns = [turn / self._unit for turn in turns]
         rows = [np.where((tau[:, k] >= 0)[:, None], system.S[tau[:, k]] / self._unit[:, k, None], 0.0) for k in (0, 1)]
         self._rows = np.stack(rows, axis=1)

@@ -1,4 +1,4 @@
-"""A solution in 3D by Newton's method in isotropic variables (theory, section 12.6), in floats."""
+"""Newton's method in 3D in floats: the projection P, and a solution in isotropic variables (theory, section 12.6)."""
 
 from __future__ import annotations
 
@@ -11,76 +11,84 @@ from enumsol.support.deadlines import look
 
 if TYPE_CHECKING:
     from enumsol.condensation.space_condensed import SpaceSystem
-    from enumsol.support.array_types import Floats
+    from enumsol.support.array_types import Floats, Indices
 
 
 #: Residual at which a point counts as a solution, relative to forces of size one.
 _SOLVED = 1e-10
 
 
+def projected(tau: Indices, F: Floats, slope: Floats, z: Floats) -> tuple[Floats, Floats]:
+    """P of arguments z, the last of them that of F, (m,), and derivatives by (n, t1, t2) and the last one, (p, 3, 4).
+
+    Parameters
+    ----------
+    tau : (p, 2) array of int, places of both components, -1 where there is none
+    F, slope : (p,) arrays
+        Radii of the discs over lambda_n, and their derivatives by the last argument.
+    z : (m + 1,) array
+        All lambda_n first; what is behind 3p of them P keeps.
+    """
+    p, m = len(tau), len(z) - 1
+    has, kept = tau >= 0, np.arange(3 * p, m)
+    normal, tangent = np.maximum(z[:p], 0.0), np.where(has, z[tau], 0.0)
+    most, length = F * normal, np.linalg.norm(tangent, axis=1)
+    touches = z[:p] > 0
+    sticks, divisor = touches & (length <= most), np.where(length > 0, length, 1.0)
+    ratio = np.where(sticks, 1.0, most / divisor)[:, None]
+    e = np.where(sticks, 0.0, 1.0 / divisor)[:, None] * tangent
+    P, D = np.zeros(m), np.zeros((p, 3, 4))
+    P[kept], P[:p], P[tau[has]] = z[kept], normal, (ratio * tangent)[has]
+    D[:, 0, 0], D[:, 1:, 0], D[:, 1:, 3] = touches, (touches * F)[:, None] * e, (slope * normal)[:, None] * e
+    D[:, 1:, 1:3] = (ratio * has)[:, :, None] * (np.eye(2) - e[:, :, None] * e[:, None, :])
+    return P, D
+
+
 @dataclass(frozen=True)
 class Isotropic:
-    """w = g - S y for y (p, 3): lambda_n and both tau, those that do not occur with equations tau = 0 of their own.
+    """w = g - S y in the variables (lambda_n, tau) of a system without its units.
 
     Attributes
     ----------
-    S : (3 p, 3 p) array
-    g : (3 p,) array
-    unit : (3 p,) array
+    S : (m, m) array
+    g : (m,) array
+    unit : (m,) array
         Powers of two: S is scaled back by them before a system is solved.
-    rho : (3 p,) array
+    tau : (p, 2) array of int
+        Places of the tau of every node, -1 where there is none.
+    rho : (m,) array
         Steps of the natural map y - P(y + rho w), one for lambda_n and one for tau of every node.
     """
 
     S: Floats
     g: Floats
     unit: Floats
+    tau: Indices
     rho: Floats
 
     @classmethod
     def of(cls, system: SpaceSystem) -> Isotropic:
         """The problem of a scaled system."""
-        p, tau = system.p, system.tau
-        places = np.column_stack([np.arange(p), tau]).ravel()
-        occurs = places >= 0
-        unit = np.where(occurs, system.unit[places], 1.0)
-        both = occurs[:, None] & occurs[None, :]
-        S = np.where(both, system.S[np.ix_(places, places)] / np.outer(unit, unit), 0.0)
-        S[~occurs, ~occurs] = 1.0
-        rho = 1.0 / np.diagonal(S).reshape(p, 3)
-        friction = np.min(np.where(occurs.reshape(p, 3)[:, 1:], rho[:, 1:], np.inf), axis=1, keepdims=True)
-        rho[:, 1:] = np.where(np.isfinite(friction), friction, 1.0)
-        return cls(S, np.where(occurs, system.g[places] / unit, 0.0), unit, rho.ravel())
+        S = system.S / np.outer(system.unit, system.unit)
+        rho = 1.0 / np.diagonal(S)
+        for t in system.tau:
+            rho[t[t >= 0]] = np.min(rho[t[t >= 0]], initial=np.inf)
+        return cls(S, system.g / system.unit, system.unit, system.tau, rho)
 
     def displacements(self, y: Floats) -> Floats:
-        """w, (p, 3)."""
-        return (self.g - self.S @ y.ravel()).reshape(-1, 3)
+        """w, (m,)."""
+        return self.g - self.S @ y
 
     def solution(self, near: Floats | None = None) -> Floats | None:
-        """A solution y, (p, 3), or None: by Newton's method from one near it or from 0, else with growing discs."""
-        found = None if near is None else self._newton(near.ravel(), 1.0)
+        """A solution y, (m,), or None: by Newton's method from one near it or from 0, else with growing discs."""
+        found = None if near is None else self.near(near)
         if found is None:
-            found = self._newton(np.zeros_like(self.g), 1.0)
-        if found is None:
-            found = self._grown()
-        return None if found is None else found.reshape(-1, 3)
+            found = self.near(np.zeros_like(self.g))
+        return self._grown() if found is None else found
 
-    def near(self, y: Floats, system: SpaceSystem) -> Floats | None:
-        """A solution like y near one, both as ``system`` has them, (m,); None if Newton's method finds none."""
-        found = self._newton(self.by_node(y, system).ravel(), 1.0)
-        if found is None:
-            return None
-        near, found = np.empty_like(y), found.reshape(-1, 3)
-        near[: system.p] = found[:, 0]
-        occurs = system.tau >= 0
-        near[system.tau[occurs]] = (found[:, 1:] / np.where(occurs, system.unit[system.tau], 1.0))[occurs]
-        return near
-
-    @staticmethod
-    def by_node(y: Floats, system: SpaceSystem) -> Floats:
-        """Forces as ``system`` has them, (m,), as they are here, (p, 3)."""
-        units = np.where(system.tau >= 0, system.unit[system.tau], 1.0)
-        return np.column_stack([y[: system.p], system.tangential(y) * units])
+    def near(self, y: Floats) -> Floats | None:
+        """A solution like y near one; None if Newton's method finds none."""
+        return self._newton(y, 1.0)
 
     def _grown(self) -> Floats | None:
         y = self._newton(np.zeros_like(self.g), 0.0)
@@ -99,7 +107,7 @@ class Isotropic:
         return y if radius >= 1.0 else None
 
     def _newton(self, y: Floats, radius: float) -> Floats | None:
-        """A solution for discs |tau| <= radius lambda_n from a point near it, (3 p,)."""
+        """A solution for discs |tau| <= radius lambda_n from a point near it, (m,)."""
         H, slopes = self._natural(y, radius)
         size, best, waited = self._merit(H), np.inf, 0
         for _ in range(40):
@@ -126,18 +134,20 @@ class Isotropic:
     def _merit(self, H: Floats) -> float:
         return float(np.linalg.norm(H / self.unit))
 
-    def _step(self, H: Floats, slopes: Floats) -> Floats | None:
+    def _step(self, H: Floats, D: Floats) -> Floats | None:
         """The solution of J step = H, J = I - D (I - rho S), solved for where D is not 0; elsewhere step = H."""
-        moving = np.flatnonzero(np.any(slopes, axis=(1, 2)))
-        D, S = slopes[moving], self.S.reshape(-1, 3, len(H))[moving] * self.rho.reshape(-1, 3, 1)[moving]
-        J = (D @ S).reshape(-1, len(H))
-        rows = (3 * moving[:, None] + np.arange(3)).ravel()
-        step = H.copy()
+        moving = np.flatnonzero(np.any(D, axis=(1, 2)))
+        at, D = np.column_stack([np.arange(len(self.tau)), self.tau])[moving], D[moving]
+        has, step = at >= 0, H.copy()
+        rows, number = at[has], np.zeros(at.shape, dtype=np.intp)
+        number[has] = np.arange(len(rows))
+        J = (D @ (self.S[at] * self.rho[at][:, :, None]))[has]
         step[rows] = 0.0
         given = H[rows] - J @ step
         J = J[:, rows]
         for i, j in np.ndindex(3, 3):
-            J[i::3, j::3][np.diag_indices(len(moving))] += (i == j) - D[:, i, j]
+            both = has[:, i] & has[:, j]
+            J[number[both, i], number[both, j]] += (i == j) - D[both, i, j]
         try:
             # in the units of the system, in which no row is small
             unit = self.unit[rows]
@@ -148,17 +158,6 @@ class Isotropic:
 
     def _natural(self, y: Floats, radius: float) -> tuple[Floats, Floats]:
         """The natural map y - P(z), z = y + rho w, with discs as large as z has lambda_n, and dP/dz, (p, 3, 3)."""
-        z = (y + self.rho * (self.g - self.S @ y)).reshape(-1, 3)
-        closed, pair = z[:, 0] > 0, z[:, 1:]
-        normal = np.where(closed, z[:, 0], 0.0)
-        length = np.linalg.norm(pair, axis=1)
-        inside = length <= radius * normal
-        safe = np.where(inside, 1.0, length)
-        e = pair / safe[:, None]
-        bend = np.where(inside, 1.0, radius * normal / safe)
-        slides = ~inside & closed
-        slopes = np.zeros((len(z), 3, 3))
-        slopes[:, 0, 0] = closed
-        slopes[:, 1:, 1:] = bend[:, None, None] * (np.eye(2) - slides[:, None, None] * e[:, :, None] * e[:, None, :])
-        slopes[:, 1:, 0] = radius * slides[:, None] * e
-        return y - np.column_stack([normal, bend[:, None] * pair]).ravel(), slopes
+        F, z = np.full(len(self.tau), radius), y + self.rho * self.displacements(y)
+        P, D = projected(self.tau, F, 0.0 * F, np.append(z, 0.0))
+        return y - P, D[:, :, :3]

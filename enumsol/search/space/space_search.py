@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
+import copy
 from dataclasses import replace
-from typing import TYPE_CHECKING
+from fractions import Fraction
+from functools import cached_property, partial
+from typing import TYPE_CHECKING, cast
 
 import numpy as np
 
-from enumsol.condensation.enclosure import NotEnclosedError
+from enumsol.condensation.enclosure import NotEnclosedError, enclosure_of
+from enumsol.condensation.space_condensed import EnclosedSpace, SpaceSystem
 from enumsol.model.sectors import (
     DEEPEST,
     RUN,
@@ -32,34 +36,35 @@ from enumsol.proof.leaves import (
     Unbalanced,
     UndecidedRecord,
 )
-from enumsol.proof.records import NOWHERE, DeclaredForm, EnclosureRecord
+from enumsol.proof.records import NOWHERE, DeclaredForm, EnclosureRecord, Limits, Tree
+from enumsol.proof.writer import Recorder
+from enumsol.relaxation.convex_forms import SlipFormAscent
 from enumsol.relaxation.engine import PRUNE_MARGIN, Relaxation
 from enumsol.relaxation.space_relaxation import SpaceEngine, SpaceRelaxation
-from enumsol.search.certifiers.protocol import WIDEN, Bound, Certifier, Refine, UndecidedPart
+from enumsol.search.certifiers.protocol import WIDEN, Bound, Certifier, Refine, UndecidedPart, Unrecorded
+from enumsol.search.nodes import Forms, TreeCloser
 from enumsol.search.outcome import HOLD
+from enumsol.search.setup import WEAK, SearchSetup, weakly_held
 from enumsol.search.space.open_leaves import Cause, KnownBoxes, obstacle, sector_to_halve
+from enumsol.search.space.space_fathoming import SpaceCloser, SpaceClosing, solved
 from enumsol.trusted.floating_bounds import motion_beside
-from enumsol.trusted.space.force_bound import resultants, unbounded
+from enumsol.trusted.space.force_bound import unbounded
 from enumsol.trusted.space.leaves import Open, SpaceRoot, settle
-from enumsol.trusted.space.sector_rows import is_sector_covering, is_within
-from enumsol.trusted.space.space_uniqueness import LeafReference, OnlySolution
+from enumsol.trusted.space.sector_rows import FRICTIONLESS, OPEN, is_sector_covering, is_within
+from enumsol.trusted.space.space_uniqueness import LeafReference
 from enumsol.trusted.space.turning import turned_by
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Sequence
+    from collections.abc import Callable, Iterable, Sequence
 
-    from enumsol.condensation.space_condensed import EnclosedSpace, SpaceSystem
-    from enumsol.proof.writer import Recorder
+    from enumsol.model.problem3d import ContactProblem3D
     from enumsol.search.reference_closer import OnlyRoot
-    from enumsol.support.array_types import Codes, Floats
+    from enumsol.support.array_types import Alpha, Codes, Floats
     from enumsol.trusted.space.boxed_solution import BoxedSolution
+    from enumsol.trusted.space.pieces import AlphaPiece
+    from enumsol.trusted.space.sector_margins import SlipForm
     from enumsol.trusted.space.sector_rows import Row
     from enumsol.trusted.space.space_uniqueness import LooseSolution
-
-
-#: Enclosures of solutions in boxes are made in steps of four.
-_WIDER = 4.0 * WIDEN
-_PERTURB, _HOLD = "perturb the load, by 1e-4 of its largest entry, say", "hold the body by stiffer springs"
 
 
 class SpaceSplitting:
@@ -85,7 +90,9 @@ class SpaceSplitting:
             return children[:: -1 if force > -w else 1]
         if codes[node] == CONTACT and self._engine.tangents[node] == 1:
             return children
-        tau, v = self._system.taus(relaxation.forces)[node], self._system.slips(relaxation.displacements)[node]
+        system = self._system
+        tau = system.tangential(relaxation.forces)[node] * system.tau_scale[node]
+        v = system.slips(relaxation.displacements)[node]
         towards = tau / (np.linalg.norm(tau) + 1e-300) + v / (np.linalg.norm(v) + 1e-300)
         return sorted(children, key=lambda code: -_towards(code, towards) if code > SECTORS else -10.0)
 
@@ -167,8 +174,8 @@ class SpaceExclusions:
             return excluded, False
         if self.system.held:
             return None
-        if (unbalanced := self.unbalanced(codes)) is not None:
-            return unbalanced, False
+        if (without := self.unbalanced(codes)) is not None:
+            return without, False
         told = not any(code in (UNDECIDED, CONTACT) for code in codes)
         if (within or told) and len(rows) and excluded.holds(self.system, codes, 2.0):
             if told and settle(self.free, codes) is None:
@@ -178,10 +185,45 @@ class SpaceExclusions:
 
     def unbalanced(self, codes: Codes) -> Unbalanced | None:
         """A record that no forces below a partial assignment are in balance with the load; or None."""
-        if self.system.held:
-            return None
-        record = Unbalanced(motion_beside(self.system, resultants(self.system, codes)))
-        return record if record.holds(self.system, codes) else None
+        return unbalanced(self.system, [self.system], codes)
+
+
+#: A disc of forces lies in a polygon of so many corners.
+_CORNERS = 16
+
+
+def unbalanced(within: EnclosedSpace | AlphaPiece, ends: Sequence[EnclosedSpace], codes: Codes) -> Unbalanced | None:
+    """A record that no forces below an assignment are in balance with the load, by the data at some alphas; or None."""
+    records = (Unbalanced(motion_beside(end, resultants(end, codes))) for end in ends if not end.held)
+    return next((record for record in records if record.holds(within, codes)), None)
+
+
+def resultants(system: EnclosedSpace, codes: Sequence[int]) -> list[Floats]:
+    """Resultants G y, (r,) each, whose cone holds all that the forces of an assignment can have, but for rounding."""
+    G, discs = system.rows.G.mid / system.unit, system.discs.mid.tolist()
+    found = []
+    for i, code in enumerate(codes):
+        if code == OPEN:
+            continue
+        places = [int(t) for t in system.tau[i] if t >= 0]
+        found += [
+            G[:, i] + discs[i] * sum((x * G[:, t] for x, t in zip(tau, places, strict=True)), 0.0 * G[:, i])
+            for tau in _corners(code, len(places))
+        ]
+    return found
+
+
+def _corners(code: int, tangents: int) -> list[tuple[float, ...]]:
+    """Corners of a polygon around the tau of a node, |tau| <= 1."""
+    if code == FRICTIONLESS or not tangents:
+        return [(0.0,) * tangents]
+    if tangents == 1:
+        return [(sign,) for sign in (1.0, -1.0) if code != (SLIP_MINUS if sign > 0 else SLIP_PLUS)]
+    if code > SECTORS:
+        a, b = (np.array(direction(n)) for n in (code - SECTORS, end_number(code - SECTORS)))
+        return [tuple(corner) for corner in (a, b, (a + b) / (1.0 + a @ b))]
+    angles = 2.0 * np.pi * np.arange(_CORNERS) / _CORNERS
+    return list(zip(*(np.array([np.cos(angles), np.sin(angles)]) / np.cos(np.pi / _CORNERS)).tolist(), strict=True))
 
 
 class SpaceCertifier(Certifier):
@@ -240,8 +282,8 @@ class SpaceCertifier(Certifier):
 
     def selection(self, codes: Codes) -> SpaceRoot | BoxedSolution | UndecidedPart | Refine | None:
         """The root of a leaf, a sector to halve, or why the leaf stays open."""
-        if (unbalanced := self._exclusions.unbalanced(codes)) is not None:
-            self._leaf(unbalanced)
+        if (without := self._exclusions.unbalanced(codes)) is not None:
+            self._leaf(without)
             return None
         answer = self._settled(codes)
         if not self.enclosed.held and (answer is None or isinstance(answer, SpaceRoot)):
@@ -264,7 +306,8 @@ class SpaceCertifier(Certifier):
             cause, mode = obstacle(answer)
             reason = cause.value if mode is None else f"{cause.value} (rigid mode {mode})"
             self._leaf(UndecidedRecord(reason))
-            hint = {Cause.ROUNDING: _HOLD, Cause.RIGID: HOLD}.get(cause, _PERTURB)
+            hints = {Cause.ROUNDING: "hold the body by stiffer springs", Cause.RIGID: HOLD}
+            hint = hints.get(cause, "perturb the load, by 1e-4 of its largest entry, say")
             return UndecidedPart(codes, reason, hint, examined=True)
         else:
             self._leaf(RegularRoot(self._ball(answer)))
@@ -275,7 +318,8 @@ class SpaceCertifier(Certifier):
         """The solution of a box, and its leaf written."""
         self._verified[codes], unit = found, self.enclosed.unit
         centre, radius, rho = found.box.numbers
-        self._leaf(BoxedRoot(centre * unit, radius * unit, rho * unit**2, self._ball(found, wider=_WIDER)))
+        # enclosures of solutions in boxes are made in steps of four
+        self._leaf(BoxedRoot(centre * unit, radius * unit, rho * unit**2, self._ball(found, wider=4.0 * WIDEN)))
         return found
 
     def _placed(self, codes: Codes, root: SpaceRoot) -> SpaceRoot:
@@ -291,7 +335,7 @@ class SpaceCertifier(Certifier):
         again = settle(self.enclosed, tuple(there)) if turning else None
         return again if isinstance(again, SpaceRoot) else root
 
-    def close(self, numbers: Floats, codes: Codes | None, normal: Floats) -> list[SpaceRoot | OnlySolution] | None:
+    def close(self, numbers: Floats, codes: Codes | None, normal: Floats) -> list[SpaceRoot | LooseSolution] | None:
         """The only solution of the whole problem, as a list, and its leaf written; None if that is not proven.
 
         Parameters
@@ -300,7 +344,7 @@ class SpaceCertifier(Certifier):
         codes : of a leaf that holds the solution; None: its statuses need not hold strictly
         normal : (p,) array, lambda_n near the solution
         """
-        found: SpaceRoot | OnlySolution | None
+        found: SpaceRoot | LooseSolution | None
         record = Alone(codes or (), numbers, NOWHERE)
         try:
             found = record.holds(self.enclosed, self._whole, errors=2.0, near=normal)
@@ -353,3 +397,135 @@ class SpaceCertifier(Certifier):
     def _ball(self, found: SpaceRoot | LooseSolution, wider: float = WIDEN) -> EnclosureRecord:
         """Ball of a root, in the problem's units."""
         return EnclosureRecord.around(found.y, self.enclosed.unit, found.index, wider)
+
+
+# -- one problem at one alpha in one arithmetic: what a search needs ---------------------------------------------------
+
+#: A form is used where it leaves no more than this share of the gap to the pruning bound at the root of the tree.
+_SHARE = 0.25
+#: Nodes examined with the energy before a form that knows where the body slides is tried (theory, section 12.2).
+NODES = 256
+
+
+class SpaceSolvers(SearchSetup):
+    """System, balls, engine and certifier for one problem in 3D at one alpha.
+
+    Parameters
+    ----------
+    problem : ContactProblem3D
+    alpha : float or Fraction
+    arithmetic : {"fast", "verified"}
+
+    Raises
+    ------
+    InvalidArgumentError, InvalidProblemError
+        Of ``problem.friction_at`` and of the condensation.
+    """
+
+    _offered, _kind = '"verified"', {"kind": "space"}
+
+    def __init__(self, problem: ContactProblem3D, alpha: Alpha, arithmetic: str) -> None:
+        super().__init__(problem, alpha, arithmetic)
+        friction = problem.friction_at(alpha)  # refuses what cannot be enumerated before anything is computed
+        condensed = problem.on_springs.condensed
+        self.system = self.scaled = SpaceSystem.scaled(condensed.S, condensed.free_displacements(alpha), friction)
+
+    @cached_property
+    def _engine(self) -> SpaceEngine:
+        """Its rows are numbered in the order in which certifier, splitting and relaxations ask for them."""
+        return SpaceEngine(self.relaxed)
+
+    @cached_property
+    def _enclosed(self) -> tuple[EnclosedSpace, str | None]:
+        floats = EnclosedSpace.of_floats(self.system)
+        if self.arithmetic == "fast":
+            return floats, None
+        try:
+            enclosed = self._in_balls(Fraction(self.alpha), self.system.force, self.system.length)
+            _ = enclosed.smallest_eigenvalue  # proven positive, or refused
+        except NotEnclosedError as error:
+            return floats, str(error)
+        return enclosed, None
+
+    def _in_balls(self, alpha: Fraction, force: Floats, length: Floats) -> EnclosedSpace:
+        """The problem in balls; NotEnclosedError where that cannot be."""
+        return EnclosedSpace.of_problem(enclosure_of(self.problem), alpha, force, length)
+
+    @property
+    def enclosed(self) -> EnclosedSpace:
+        """Balls for the scaled system; in fast arithmetic, or where nothing can be proven, without radii."""
+        return self._enclosed[0]
+
+    @property
+    def undecidable(self) -> str | None:
+        """Why verified arithmetic cannot prove anything about this problem, or None."""
+        return self._enclosed[1]
+
+    @cached_property
+    def relaxed(self) -> SpaceSystem:
+        """System of the relaxations; a body that nothing holds is on weak springs (theory, section 14.5)."""
+        return self._on_springs(WEAK)
+
+    def _on_springs(self, stiffness: float) -> SpaceSystem:
+        if self.problem.held or self.enclosed.held:
+            return self.system
+        S, g = weakly_held(self.system.S, self.system.g, self.enclosed.rows, stiffness)
+        return replace(self.system, S=S, g=g)
+
+    @cached_property
+    def _exclusions(self) -> SpaceExclusions:
+        """Proofs that assignments have no solution."""
+        return SpaceExclusions(self.enclosed)
+
+    def certifier(self, recorder: Recorder | None) -> SpaceCertifier:
+        """The certifier of this arithmetic."""
+        if recorder is None or self.arithmetic == "fast":
+            recorder = Unrecorded()
+        return SpaceCertifier(self._engine, self.enclosed, recorder, self._exclusions)
+
+    def _solved(self, system: SpaceSystem, near: Floats | None) -> tuple[list[Codes], Floats] | None:
+        with np.errstate(all="ignore"):
+            found = solved(system, near)
+        # a body on springs has slightly different directions
+        # from sectors of three degrees on
+        return None if found is None else ([found[0].leaf(7), found[0].codes], found[1])
+
+    def _splitting(self, certifier: Certifier) -> SpaceSplitting:
+        return SpaceSplitting(self._engine)
+
+    def _closer(self, certifier: Certifier) -> TreeCloser | None:
+        if not self.problem.held:
+            from enumsol.search.space.space_references import space_closer  # for such bodies only
+
+            return None if self.enclosed.held else space_closer(certifier, self._engine, lambda: self.known_root)
+        return SpaceCloser(self.system, cast("SpaceClosing", certifier), regular=self.arithmetic == "fast")
+
+    @property
+    def _forms(self) -> Forms | None:
+        """Forms with which a long search may bound in place of the energy."""
+        return Forms(self._better, SpaceEngine.bounding, NODES)
+
+    def _better(self, engine: SpaceEngine, codes: Codes, rows: tuple[list[int], list[int]]) -> SlipForm | None:
+        """A form that is clearly tighter than the energy over a partial assignment, or None."""
+        plain = engine.root(*rows)
+        if plain.stalled or plain.pruned:
+            return None
+        found = SlipFormAscent(engine, self.enclosed, rows).ascended()
+        return None if found is None or not found[1].bound > _SHARE * plain.bound else found[0]
+
+    def remake(self) -> Callable[[], SpaceSolvers]:
+        """Makes the same again, also in another process."""
+        return partial(type(self), self.problem, self.alpha, self.arithmetic)
+
+    def fresh(self) -> SpaceSolvers:
+        """Solvers with an engine of their own: which rows it has already changes what it finds."""
+        other = copy.copy(self)
+        other.__dict__.pop("_engine", None)
+        return other
+
+    @property
+    def limits(self) -> Limits:
+        """Limits of the records at the root of the tree of a proof."""
+        system, tree = self.system, Tree.SPACE if self.problem.held else Tree.FLOATING_SPACE
+        codes, modes = (UNDECIDED,) * system.p, self.problem.modes.r
+        return Limits(codes, tree, components=len(system.g), modes=modes)

@@ -183,7 +183,7 @@ class _Along:
         F = Ball(np.column_stack([constant.mid, slope.mid]), np.column_stack([constant.rad, slope.rad]))
         theta[rows.slip, :2] = signed(F[rows.slip], rows.slip_signs[:, None])
         if len(rows.stick):
-            loaded = self._normal[rows.stick_columns]
+            loaded = self._normal[rows.normal]
             middle, half = 0.5 * (self._ends[1] + self._ends[0]), 0.5 * (self._ends[1] - self._ends[0])
             places = middle - half * np.cos(np.pi * np.arange(degree + 1) / degree)
             shares = _values(self._stuck, places) / _values(loaded, places)
@@ -221,7 +221,7 @@ class _Along:
         system, rows, p, series = self._system, self._rows, self._system.p, self._series
         shape = len(system.S.mid), self._t.mid.shape[1] + 1
         force = Ball(np.zeros(shape), np.zeros(shape))
-        slipping = self._normal[rows.slip_columns]
+        slipping = self._normal[rows.side]
         bound = _turned(*self._linear(system.F0[rows.slip], system.F1[rows.slip]), slipping)
         for places, part, signs in (
             (rows.closed, _longer(self._normal), 1.0),

@@ -281,7 +281,8 @@ class _Stack:
         # so much more that tau stays within [-1, 1] where it is rounded
         self._radius = np.maximum(high - self._middle, self._middle - low) * (1.0 + 2.0**-20) + TINY
         self._H, self._H1, self._H_rad, self._H1_rad = self._forms()
-        self._H[:, self._k - 1] = _last_row(self._k) if plain else self._directions()
+        # with the last unit vector t = 1
+        self._H[:, self._k - 1] = np.eye(self._k)[-1] if plain else self._directions()
         # bounds of rounding errors below are themselves rounded, in two products and a few operations
         self._safe = (1.0 + gamma(2 * self._k + 8)) * SAFE
 
@@ -420,13 +421,6 @@ class _Stack:
         most = 2.0**-10 if self._plain else 0.5 / self._errors
         found = np.where(share < most, found / (1.0 - share) * SAFE, np.nan)
         return np.asarray(np.where(found * self._errors < 1e6, found, np.nan))
-
-
-def _last_row(k: int) -> Floats:
-    """The last row of N with which t = 1."""
-    found = np.zeros(k)
-    found[-1] = 1.0
-    return found
 
 
 def _each(function: Callable[..., Floats], *stacks: Floats) -> Floats:

@@ -15,18 +15,67 @@ from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from flint import arb, arb_mat
+from flint import arb, arb_mat, ctx, fmpq
 
 from enumsol.arithmetic.balls import SAFE, UNIT, upper_sum
-from enumsol.trusted.arcs.many_digits import ball_of, column, matrix, precision, sign_of, signs_of, uppers
 from enumsol.trusted.arcs.over_parts import OverInterval
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+    from contextlib import AbstractContextManager
+
     from enumsol.support.array_types import Floats, NDArray
 
     Signs = NDArray[np.int8]
     Number = float | Fraction
     Pair = tuple[Any, ...]
+
+#: Bits of the arithmetic.
+PRECISION = 320
+
+
+def upper(value: arb) -> float:
+    """At least the size of all numbers in a ball."""
+    return float(np.nextafter(float(abs(value).upper()), np.inf))
+
+
+def uppers(values: arb_mat) -> Floats:
+    """Upper bounds of the sizes of all entries of a matrix."""
+    sizes = np.array([[float(abs(x).upper()) for x in row] for row in values.tolist()])
+    bounds: Floats = np.nextafter(sizes, np.inf)
+    return bounds
+
+
+def precision() -> AbstractContextManager[object]:
+    """The precision of flint's balls, for a while."""
+    context: AbstractContextManager[object] = ctx.workprec(PRECISION)
+    return context
+
+
+def matrix(rows: list[list[Any]]) -> Any:
+    """A matrix of balls, by its rows."""
+    return arb_mat(len(rows), len(rows[0]) if rows else 0, [x for row in rows for x in row])
+
+
+def column(values: Sequence[Any]) -> Any:
+    """A matrix with one column."""
+    return arb_mat(len(values), 1, list(values))
+
+
+def ball_of(alpha: Fraction) -> Any:
+    """A ball that holds a fraction."""
+    return arb(fmpq(alpha.numerator, alpha.denominator))
+
+
+def sign_of(value: arb) -> int:
+    """Sign of all numbers in a ball, 0 where it is not proven."""
+    return int(value > 0) - int(value < 0)
+
+
+def signs_of(values: arb_mat) -> Signs:
+    """Signs of the balls in a column."""
+    return np.array([sign_of(values[k, 0]) for k in range(values.nrows())], dtype=np.int8)
+
 
 #: Powers of tau in the unknowns: more of them allow longer intervals, and cost a product each.
 _TERMS = 12

@@ -15,10 +15,10 @@ from itertools import pairwise, permutations, product
 
 import numpy as np
 
-from enumsol.arithmetic.balls import SAFE, TINY, UNIT, Ball, solution, upper_norm
+from enumsol.arithmetic.balls import SAFE, UNIT, Ball, solution
 from enumsol.support.array_types import Codes, Floats
 from enumsol.trusted.space.curve_runs import CurveLink, Range
-from enumsol.trusted.space.natural_map import Directions, upper_product
+from enumsol.trusted.space.natural_map import Slips
 from enumsol.trusted.space.sector_rows import FRICTIONLESS, OPEN, STICK
 from enumsol.trusted.space.solution_curve import (
     SLIP,
@@ -56,43 +56,16 @@ class CurveMotion:
         unit, box = problem.unit, curve.box
         self._border = (box.border if border is None else border) * unit
         near = map_around(problem, replace(box, rho=np.ones(problem.m)))
-        self._Z, z, along = near.moves, near.z, near.zd
-        side = upper_product(self._Z.size, curve.spread / unit)
+        extent, self._Z = near.extent(curve.spread / unit), near.moves
         #: (z, alpha) at all points of the curve.
-        self.z = Ball(z.mid, (z.rad + along.size * box.half + side) * SAFE + TINY)
-        self._past = problem.past(z, along, box.half, side * SAFE)
-        self._F = problem.friction(self.z[-1])
+        self.z = extent.near
+        discs = problem.discs(self.z[-1])
+        with np.errstate(all="ignore"):
+            slips = Slips(discs, extent)
+        self._F, self._at, self._lengths = discs.F, slips.at, problem.lengths(self.z)
+        #: The statuses that every node may have at points of the curve.
+        self.possible = problem.possible(self.z, slips.gap)
         self._speeds: dict[tuple[int, ...], Ball | None] = {}
-
-    # -- statuses --------------------------------------------------------------------------------------------------
-
-    @cached_property
-    def possible(self) -> tuple[frozenset[int], ...]:
-        """The statuses that every node may have at points of the curve."""
-        return tuple(map(self._possible, range(self.problem.p)))
-
-    def _possible(self, i: int) -> frozenset[int]:
-        low, high = _ends(self.z[i])
-        found = {OPEN} if low <= 0 else set()
-        if high < 0:
-            return frozenset(found)
-        if not len(self.problem.tau[i]):
-            return frozenset(found | {FRICTIONLESS})
-        least, most = self._lengths(i)
-        F_low, F_high = _ends(self._F[i])
-        past = _sign(self._past[i])
-        if past <= 0 and F_high >= 0 and least <= F_high * high * SAFE + TINY:
-            found.add(STICK)
-        if past >= 0 and (F_low < 0 or most >= F_low * max(low, 0.0) / SAFE - TINY):
-            found.add(SLIP)
-        return frozenset(found)
-
-    def _lengths(self, i: int) -> tuple[float, float]:
-        """Bounds of |z_t|; the lower one may be negative."""
-        t = self.problem.tau[i]
-        length, away = float(np.linalg.norm(self.z.mid[t])), float(upper_norm(self.z.rad[t]))
-        rounded = 8 * UNIT * length + TINY
-        return length - away * SAFE - rounded, length + away * SAFE + rounded
 
     # -- first derivatives -----------------------------------------------------------------------------------------
 
@@ -121,7 +94,7 @@ class CurveMotion:
         return None if D is None else Ball.joined(self.problem.part - D @ self._Z, Ball.exact(self._border[None]))
 
     def _derivative(self, codes: Sequence[int]) -> Ball | None:
-        """Derivative of the projection P with respect to (z, alpha), by (12.17)."""
+        """Derivative of the projection P with respect to (z, alpha), by (12.11)."""
         m = self.problem.m
         D = Ball(np.zeros((m, m + 1)), np.zeros((m, m + 1)))
         kept = np.arange(3 * self.problem.p, m)
@@ -144,23 +117,15 @@ class CurveMotion:
 
     def _direction(self, i: int) -> tuple[Ball, Ball, Ball] | None:
         """e = z_t / |z_t|, 1 - e e' and 1 / |z_t|; None where z_t may vanish."""
-        t, (least, most) = self.problem.tau[i], self._lengths(i)
+        t, least, most = self.problem.tau[i], *(float(part[i]) for part in self._lengths)
         if not least > 0:
             return None
         middle, half = 0.5 * (1.0 / least + 1.0 / most), 0.5 * (1.0 / least - 1.0 / most)
         inverse = Ball(np.array(middle), np.array((half + 4 * UNIT * middle) * SAFE))
         if len(t) == 1:
             return Ball.exact(np.sign(self.z.mid[t])), Ball.exact(np.zeros((1, 1))), inverse
-        at = self._directions
+        at = self._at
         return Ball(at.e[i], at.turn[i]), Ball(at.across[i], at.bent[i] + 16 * UNIT), inverse
-
-    @cached_property
-    def _directions(self) -> Directions:
-        """Directions of z_t of all nodes; they serve where it has two components and does not vanish."""
-        places = self.problem.places
-        x = Ball(np.where(places >= 0, self.z.mid[places], 0.0), np.where(places >= 0, self.z.rad[places], 0.0))
-        with np.errstate(all="ignore"):
-            return Directions.of(x)
 
     # -- conditions ------------------------------------------------------------------------------------------------
 
@@ -209,7 +174,7 @@ class CurveMotion:
         return 0 if found is None else _sign(found[m, 0])
 
     def _bent(self, i: int, moved: Ball) -> Ball | None:
-        """The second derivative of F z_n e along a node's speed (12.24)."""
+        """The second derivative of F z_n e along a node's speed (12.26)."""
         found, t = self._direction(i), self.problem.tau[i]
         if found is None:
             return None
@@ -223,18 +188,8 @@ class CurveMotion:
         return two * F1 * alpha * normal * e + turned - F * z * (two * along * beside + size * e)
 
 
-def _ends(ball: Ball) -> tuple[float, float]:
-    """Rounded outwards."""
-    low, high = float(ball.mid - ball.rad), float(ball.mid + ball.rad)
-    return low - 2 * UNIT * abs(low) - TINY, high + 2 * UNIT * abs(high) + TINY
-
-
 def _sign(ball: Ball) -> int:
     return int(np.sign(ball.mid)) if abs(ball.mid) > ball.rad * SAFE else 0
-
-
-#: So many nodes at most may change their statuses too near to each other to be told apart.
-_AT_ONCE = 3
 
 
 @dataclass(frozen=True, eq=False)
@@ -493,7 +448,8 @@ class LinkParts:
         here = start.codes
         if not loose:
             return here, []
-        if len(loose) > _AT_ONCE or any(len(motion.possible[i]) > 2 for i in loose):
+        # three at most are told apart whatever their order is
+        if len(loose) > 3 or any(len(motion.possible[i]) > 2 for i in loose):
             return None, []
         pairs = [(here[i], next((code for code in motion.possible[i] if code != here[i]), here[i])) for i in loose]
         # every condition passes zero once at most, whatever the statuses of the other nodes are

@@ -10,20 +10,16 @@ from typing import TYPE_CHECKING, Self
 
 import numpy as np
 
-from enumsol.arithmetic.balls import SAFE, TINY, UNIT, Ball, gamma, upper_norm
+from enumsol.arithmetic.balls import SAFE, TINY, UNIT, Ball, gamma, least_eigenvalue, upper_norm
 from enumsol.model.sectors import SECTORS, direction, end_number
 from enumsol.trusted.space.sector_rows import FRICTIONLESS, OPEN, SLIP_MINUS, SLIP_PLUS
-from enumsol.trusted.uniqueness_forms import least_eigenvalue
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from enumsol.condensation.space_condensed import EnclosedSpace, PieceSpace
+    from enumsol.condensation.space_condensed import EnclosedSpace
     from enumsol.support.array_types import Floats, Indices
     from enumsol.trusted.uniqueness_forms import Multipliers
-
-#: The form in the coordinates of the ellipsoid is proven to be within this of the unit matrix.
-_NEAR = 0.5
 
 
 @dataclass(frozen=True)
@@ -139,7 +135,8 @@ def _ellipsoid(
     value = (point.T @ moved + b[None] @ point)[0, 0] - const
     low = float(value.mid - (value.rad + 4 * UNIT * abs(value.mid)) * SAFE)
     low -= float(most @ ((left @ point)[:, 0] + pushed).size) * SAFE
-    if not (off < _NEAR and np.isfinite(pull) and np.isfinite(low)):
+    # the form in the coordinates of the ellipsoid is within a half of the unit matrix
+    if not (off < 0.5 and np.isfinite(pull) and np.isfinite(low)):
         return None
     # least |s|^2 - 2 pull |s| + low <= 0, of which d = 0 is a solution
     least = (1.0 - off) / SAFE
@@ -147,15 +144,11 @@ def _ellipsoid(
     return centre, T, float((pull + np.sqrt(under) * SAFE) / least * SAFE * SAFE + TINY)
 
 
-#: A disc of forces lies in a polygon of so many corners.
-_CORNERS = 16
-
-
-def is_unbalanced_in_space(system: EnclosedSpace | PieceSpace, codes: Sequence[int], z: Floats) -> bool:
+def is_unbalanced_in_space(system: EnclosedSpace, codes: Sequence[int], z: Floats) -> bool:
     """True if no forces below a partial assignment are in balance with the load, by z (r,); see theory, (14.7).
 
     z'h > 0, and z'G y <= 0 for all y of every node: (1, tau) with tau in the disc, or on the arc of its sector. Proven
-    at both ends of a piece of alpha, it is so in between (theory, section 14.14).
+    at both ends of a piece of alpha, it is so in between (theory, section 14.8).
     """
     with np.errstate(over="ignore", invalid="ignore"):
         (G, h), p, k = (system.rows.G, system.rows.h), system.p, gamma(len(z) + 16)
@@ -202,31 +195,3 @@ def _most_friction(code: int, across: Floats, length: float, spread: float) -> f
 def unbounded(system: EnclosedSpace) -> EnclosedSpace:
     """The system without bounds of the rigid displacement."""
     return system.reaching(np.full_like(system.reach, np.inf))
-
-
-def resultants(system: EnclosedSpace | PieceSpace, codes: Sequence[int]) -> list[Floats]:
-    """Resultants G y, (r,) each, whose cone holds all that the forces of an assignment can have, but for rounding."""
-    G, discs = system.rows.G.mid / system.unit, system.discs.mid.tolist()
-    found = []
-    for i, code in enumerate(codes):
-        if code == OPEN:
-            continue
-        places = [int(t) for t in system.tau[i] if t >= 0]
-        found += [
-            G[:, i] + discs[i] * sum((x * G[:, t] for x, t in zip(tau, places, strict=True)), 0.0 * G[:, i])
-            for tau in _corners(code, len(places))
-        ]
-    return found
-
-
-def _corners(code: int, tangents: int) -> list[tuple[float, ...]]:
-    """Corners of a polygon around the tau of a node, |tau| <= 1."""
-    if code == FRICTIONLESS or not tangents:
-        return [(0.0,) * tangents]
-    if tangents == 1:
-        return [(sign,) for sign in (1.0, -1.0) if code != (SLIP_MINUS if sign > 0 else SLIP_PLUS)]
-    if code > SECTORS:
-        a, b = (np.array(direction(n)) for n in (code - SECTORS, end_number(code - SECTORS)))
-        return [tuple(corner) for corner in (a, b, (a + b) / (1.0 + a @ b))]
-    angles = 2.0 * np.pi * np.arange(_CORNERS) / _CORNERS
-    return list(zip(*(np.array([np.cos(angles), np.sin(angles)]) / np.cos(np.pi / _CORNERS)).tolist(), strict=True))

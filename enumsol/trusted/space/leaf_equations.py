@@ -44,9 +44,8 @@ class State(NamedTuple):
 
     @property
     def whole_J(self) -> Ball:  # noqa: N802 (as J)
-        """Derivatives with respect to (psi, s), over a piece of alpha."""
-        assert self.G_turn is not None
-        return Ball.beside(self.J, self.G_turn[:, None])
+        """Derivatives with respect to psi and, over a piece of alpha, s."""
+        return self.J if self.G_turn is None else Ball.beside(self.J, self.G_turn[:, None])
 
 
 class Leaf:
@@ -285,17 +284,25 @@ def slopes_by_second(inverse: Ball, point: Ball, box: Ball, beside: Floats) -> B
 def around_middle(
     leaf: Leaf, Y: Floats, k: int, box: tuple[Floats, Floats], over: tuple[State, State]
 ) -> tuple[Ball, Ball, Ball]:
-    """I - Y J_u, -Y J_k and -Y G(c) of (12.22d) over a box and a piece, u being all z = (psi, s) but z_k.
+    """I - Y J_u and -Y J_k of (12.22) over a box and a piece, and where u is but for z_k (-Y J_k).
 
-    For all zeros in the box u is in (I - Y J_u) u + z_k (-Y J_k) - Y G(c). ``over``: see ``Leaf.bends``.
+    z = (psi, s), u being all of these but z_k. For all zeros in the box u is in (I - Y J_u) u + z_k (-Y J_k) - Y G(c).
+    At one alpha there is no s, and nothing along it. ``over``: see ``Leaf.bends``.
     """
     (angle, radius), (state, point), q = box, over, len(box[0])
     if not q:
         return Ball.exact(np.zeros((0, 0))), Ball.exact(np.zeros(0)), Ball.exact(np.zeros(0))
-    inverse, (turned, swept) = Ball.exact(Y), leaf.second(Y, over, angle, radius)
-    slope = slopes_by_second(inverse, point.whole_J, state.whole_J, (turned + swept) * SAFE)
-    others = np.delete(np.arange(q + 1), k)
-    return Ball.exact(np.eye(q)) - slope[:, others], -slope[:, k], -(inverse @ point.G)
+    inverse, others = Ball.exact(Y), np.delete(np.arange(q + 1), k)
+    if leaf.piece:
+        turned, swept = leaf.second(Y, over, angle, radius)
+        slope = slopes_by_second(inverse, point.whole_J, state.whole_J, (turned + swept) * SAFE)
+        along = -slope[:, k]
+    else:
+        known = None if leaf.free else leaf.bends(Y, over, angle, radius)[1]
+        slope = inverse @ state.J if known is None else slopes_by_second(inverse, point.J, state.J, known)
+        along = Ball.exact(np.zeros(q))
+    left = Ball.exact(np.eye(q)) - slope[:, others]
+    return left, along, left @ Ball(np.zeros(q), np.append(radius, 1.0)[others]) - inverse @ point.G
 
 
 def with_free_bounds(leaf: Leaf, angle: Floats, radius: Floats, *, still: bool = False) -> tuple[Floats, Floats] | None:
@@ -558,8 +565,7 @@ def _swept(leaf: Leaf, angle: Floats, radius: Floats, *, by_alpha: bool = False)
     if chosen is None:
         return None
     (k, Y), sizes = chosen, np.r_[radius, 1.0]
-    left, along, start = around_middle(leaf, Y, k, (angle, radius), (state, point))
-    beside = left @ Ball(np.zeros(len(angle)), np.delete(sizes, k)) + start
+    _, along, beside = around_middle(leaf, Y, k, (angle, radius), (state, point))
     middle, turn = by_parameter(leaf, (state, point), k, beside, along)
     return Sweep(middle, turn, beside, along, float(sizes[k]), k)
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-import math
+from math import ceil, log2
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -11,10 +11,9 @@ from enumsol.arithmetic.balls import SAFE, TINY, Ball, upper_norm, upper_sum
 from enumsol.condensation.enclosure import enclosure_of
 from enumsol.condensation.space_condensed import EnclosedSpace, SpaceSystem
 from enumsol.model.restart import SlipStart, restarted
-from enumsol.model.sectors import DEEPEST, SECTORS, places
 from enumsol.trusted.space.leaf_equations import ROUNDED_ANGLE, Leaf, State, turned
 from enumsol.trusted.space.leaves import SpaceRoot, contents
-from enumsol.trusted.space.sector_rows import FRICTIONLESS, OPEN, SLIP_MINUS, SLIP_PLUS, STICK
+from enumsol.trusted.space.sector_rows import SLIP_MINUS, SLIP_PLUS, STICK, leaf_code
 from enumsol.trusted.space.turning import held_by
 
 if TYPE_CHECKING:
@@ -55,7 +54,11 @@ def leaf_positions(problem: Any, alpha: Fraction, forces: Ball, codes: Sequence[
     size, wide = np.linalg.norm(tau.mid, axis=1), upper_norm(tau.rad, axis=1)
     # up to 1/2 arcsin is at most 1.05 times as large as its argument; otherwise any angle
     angle = np.where(wide < 0.5 * size, 1.1 * wide / np.where(size > 0, size, 1.0), _ANY)
-    codes = [_code(*node) for node in zip(codes, enclosed.tau.tolist(), tau.mid.tolist(), angle.tolist(), strict=True)]
+    nodes = zip(codes, enclosed.tau.tolist(), tau.mid.tolist(), angle.tolist(), strict=True)
+    codes = [
+        leaf_code(code, places, force, max(2, min(_LEVEL, -ceil(log2(wide * _SHARE + 2.0**-_LEVEL)))))
+        for code, places, force, wide in nodes
+    ]
     along = np.isin(codes, (SLIP_PLUS, SLIP_MINUS))
     # along one axis the force's sign is known where its angle is
     if np.any(angle[along] >= _ANY):
@@ -77,11 +80,8 @@ def leaf_positions(problem: Any, alpha: Fraction, forces: Ball, codes: Sequence[
     w = _moved(leaf, root, near, beside, _spread(problem, enclosed, length))
     if w is None:
         return None
-    found = Ball(np.zeros(2 * p), np.full(2 * p, np.inf))
-    for k in range(2):
-        nodes = np.flatnonzero(moves & (enclosed.tau[:, k] >= 0))
-        part = w[enclosed.tau[nodes, k]] * enclosed.inverse_friction[nodes, k]
-        found[k * p + nodes] = Ball(part.mid * length[nodes], part.rad * length[nodes])
+    found, still = enclosed.displacements_of(w, length)[p:], ~np.concatenate([moves, moves])
+    found.mid[still], found.rad[still] = 0.0, np.inf
     return found
 
 
@@ -150,17 +150,3 @@ def _by_load(leaf: Leaf, angle: Floats, load: Indices) -> tuple[Ball, Ball] | No
 def _slopes(state: State) -> Ball:
     """Derivatives of w by all unknowns beside x."""
     return Ball.beside(state.box.dw, state.box.ds)
-
-
-def _code(code: int, tau: Sequence[int], force: Sequence[float], angle: float) -> int:
-    """The code of a leaf for a node whose tangential force over its coefficients is known but for an angle."""
-    occurs = [k for k in range(2) if tau[k] >= 0]
-    if code == OPEN or not occurs:
-        return OPEN if code == OPEN else FRICTIONLESS
-    if code == STICK:
-        return STICK
-    if len(occurs) == 1:
-        return SLIP_PLUS if force[occurs[0]] > 0 else SLIP_MINUS
-    level = max(2, min(_LEVEL, -math.ceil(math.log2(angle * _SHARE + 2.0**-_LEVEL))))
-    place = math.floor(float(places(np.array(force))))
-    return SECTORS + (1 << level) + (place >> (DEEPEST + 2 - level))

@@ -24,7 +24,6 @@ from enumsol.trusted.space.leaf_equations import (
     is_broken,
     patterns,
     slacks,
-    slopes_by_second,
     span_in,
     turned,
     with_free_bounds,
@@ -206,17 +205,9 @@ def krawczyk(leaf: Leaf, angle: Floats, radius: Floats, state: State, *, rough: 
         Y = np.asarray(rough_inverse(state.J) if rough else np.linalg.inv(point.J.mid), dtype=np.float64)
     except np.linalg.LinAlgError:
         return None
-    inverse, span = Ball.exact(Y), Ball(np.zeros(q), radius)
-    if leaf.piece:
-        left, along, start = around_middle(leaf, Y, q, (angle, radius), (state, point))
-        move = left @ Ball(np.zeros(q), radius) + start
-        # from the middle of a piece to any alpha, the angles held, then to any angles
-        return Ball(move.mid, (move.rad + along.size) * SAFE)
-    slope = inverse @ state.J
-    if not leaf.free:
-        beside = leaf.bends(Y, (state, point), angle, radius)[1]
-        slope = slopes_by_second(inverse, point.J, state.J, beside)
-    return (Ball.exact(np.eye(q)) - slope) @ span - inverse @ point.G
+    _, along, move = around_middle(leaf, Y, q, (angle, radius), (state, point))
+    # from the middle of a piece to any alpha, the angles held, then to any angles
+    return Ball(move.mid, (move.rad + along.size) * SAFE) if leaf.piece else move
 
 
 def _refined(leaf: Leaf, angle: Floats, radius: Floats, reach: Floats) -> SpaceRoot | Open | None:

@@ -219,7 +219,7 @@ class Discs:
         m, width = len(z.mid), len(z.mid) + (self.slope is not None)
         core = Ball(np.zeros((m, width)), np.zeros((m, width)))
         nothing = Ball.exact(np.zeros(1))
-        found = _Blocks.of(_Slips(self, Extent.around(Ball.joined(z, nothing)) if extent is None else extent))
+        found = _Blocks.of(Slips(self, Extent.around(Ball.joined(z, nothing)) if extent is None else extent))
         if found is None:
             return None
         block, u, v = found.middle, found.u, found.v
@@ -238,7 +238,7 @@ class Discs:
         return Corners(core, found.turns, U, V)
 
 
-class _Slips:
+class Slips:
     """How the directions in which nodes slip, and the sizes of their friction, change over a set.
 
     To first order these are products with rows, in which changes cancel (theory, section 12.8).
@@ -391,16 +391,16 @@ class _Blocks:
         return Ball(mid, self.rad + 2 * UNIT * np.abs(mid) * (added != 0))
 
     @classmethod
-    def of(cls, slips_of: _Slips) -> Self | None:
+    def of(cls, slips_of: Slips) -> Self | None:
         """Derivatives at all points of a set; None where there is no bound."""
         z, F, at, change = slips_of.z, slips_of.discs.F, slips_of.at, np.abs(slips_of.change)
         p, tau = len(F.mid), slips_of.discs.tau
-        low, high = _outwards(z.mid[:p], z.rad[:p])
-        F_low, F_high = _outwards(F.mid, F.rad)
+        low, high = outwards(z[:p])
+        F_low, F_high = outwards(F)
         # of the discs' radii
         least = F_low * np.where(F_low >= 0, np.maximum(low, 0.0), high) - TINY
         least, most = np.where(least > 0, least / SAFE, least * SAFE), np.maximum(F_high, 0.0) * high * SAFE + TINY
-        gap_low, gap_high = _outwards(slips_of.gap.mid, slips_of.gap.rad)
+        gap_low, gap_high = outwards(slips_of.gap)
         touches, loose = high >= 0, low <= 0
         sticks, slips = (at.least <= most) & (gap_low <= 0), (at.most >= least) & (gap_high >= 0)
         rubs = np.any(tau >= 0, axis=1) & touches
@@ -570,6 +570,7 @@ def upper_product(matrix: Floats, vector: Floats) -> Floats:
     return np.asarray(upper_sum(matrix * vector, axis=1))
 
 
-def _outwards(middle: Floats, radius: Floats) -> tuple[Floats, Floats]:
-    low, high = middle - radius, middle + radius
+def outwards(ball: Ball) -> tuple[Floats, Floats]:
+    """Lower and upper ends of balls, rounded outwards."""
+    low, high = ball.mid - ball.rad, ball.mid + ball.rad
     return low - 2 * UNIT * np.abs(low) - TINY, high + 2 * UNIT * np.abs(high) + TINY

@@ -11,8 +11,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from enumsol.arithmetic.balls import SAFE, TINY, UNIT, Ball
-from enumsol.condensation.space_condensed import PieceSpace
 from enumsol.trusted.space.force_bound import is_unbalanced_in_space
+from enumsol.trusted.space.krawczyk import MARGIN
 from enumsol.trusted.space.leaf_equations import (
     ROUNDED_ANGLE,
     Leaf,
@@ -32,14 +32,12 @@ from enumsol.trusted.space.space_uniqueness import is_complete, only_on_curve
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from enumsol.condensation.space_condensed import AlphaSpace, EnclosedSpace, PieceSpace
+    from enumsol.condensation.space_condensed import AlphaSpace, EnclosedSpace
     from enumsol.support.array_types import Codes, Floats
     from enumsol.trusted.space.curve_runs import KnownCurve, LinkRange
     from enumsol.trusted.space.sector_rows import Row
     from enumsol.trusted.space.solution_curve import AlphaProblem, SolutionCurve
 
-#: What a writer of proofs asks for beyond what a checker does, of the size of a box.
-_MARGIN = 2.0**-10
 #: How often the box of an arc is made wider, and by how much more than is needed.
 _WIDENINGS, _ROOM = 6, 1.125
 #: How often a piece is narrowed for a leaf, to which multiples of its half, and where that is too little.
@@ -68,12 +66,12 @@ class AlphaPiece:
         return (self.low + self.high) / 2
 
     @cached_property
-    def whole(self) -> PieceSpace:
+    def whole(self) -> EnclosedSpace:
         """The data over all of it."""
         return self.space.over(self.low, self.high)
 
     @cached_property
-    def ends(self) -> tuple[PieceSpace, PieceSpace]:
+    def ends(self) -> tuple[EnclosedSpace, EnclosedSpace]:
         """The data at both ends."""
         return self.space.at(self.low), self.space.at(self.high)
 
@@ -95,27 +93,12 @@ class AlphaPiece:
 
     def forces(self, y: Ball) -> Ball:
         """Forces in the units of the problem, (3p,), all normals first, of scaled ones."""
-        system, (force, _), p = self.space.fixed, self.space.units, len(self.space.units[0])
-        found = Ball(np.zeros(3 * p), np.zeros(3 * p))
-        # powers of two but for F: what is rounded besides is less than TINY
-        found[:p] = Ball(y.mid[:p] * force, y.rad[:p] * force + TINY)
-        for k in (0, 1):
-            nodes = np.flatnonzero(system.tau[:, k] >= 0)
-            part = y[system.tau[nodes, k]] * Ball(system.F[nodes, k], system.F_rad[nodes, k])
-            found[(1 + k) * p + nodes] = Ball(part.mid * force[nodes], part.rad * force[nodes] + TINY)
-        return found
+        return self.space.fixed.forces_of(y, self.space.units[0])
 
     def displacements(self, y: Ball, w: Ball, alpha: Ball) -> Ball:
         """Bounds of displacements w, (3p,), at all alpha of a ball; y of ``rigid``."""
-        system, (_, length), p = self.space.fixed, self.space.units, len(self.space.units[0])
-        found = Ball(np.zeros(3 * p), np.zeros(3 * p))
-        found[:p] = Ball(w.mid[:p] * length, w.rad[:p] * length + TINY)
-        for k in (0, 1):
-            nodes = np.flatnonzero(system.tau[:, k] >= 0)
-            F = Ball(system.F[nodes, k], system.F_rad[nodes, k])
-            size = length[nodes]
-            part = w[system.tau[nodes, k]] * _inverse(F)
-            found[(1 + k) * p + nodes] = Ball(part.mid * size, part.rad * size + TINY)
+        system, p = self.space.fixed, len(self.space.units[0])
+        found = system.displacements_of(w, self.space.units[1])
         # where there is no friction they follow from the forces
         missing = np.concatenate([(1 + k) * p + np.flatnonzero(system.tau[:, k] < 0) for k in (0, 1)])
         if len(missing):
@@ -178,7 +161,7 @@ class AlphaPiece:
     @cached_property
     def point(self) -> AlphaPiece:
         """The middle alone."""
-        return self.point_at(self.middle)
+        return self.over(self.middle, self.middle)
 
     def wider(self, factor: int, interval: tuple[Fraction, Fraction]) -> AlphaPiece:
         """The piece and so many times its length on both sides, as far as that is within an interval."""
@@ -187,12 +170,8 @@ class AlphaPiece:
         return AlphaPiece(self.space, low, high) if factor else self
 
     def over(self, low: Fraction, high: Fraction) -> AlphaPiece:
-        """Another piece."""
+        """Another piece, or one alpha alone."""
         return AlphaPiece(self.space, low, high)
-
-    def point_at(self, alpha: Fraction) -> AlphaPiece:
-        """Piece of one alpha alone."""
-        return AlphaPiece(self.space, alpha, alpha)
 
     def arc(self, codes: Sequence[int], errors: float = 1.0, found: SpaceRoot | Open | None = None) -> LeafArc | None:
         """The arc on which all roots of a leaf lie at all alpha of the piece, if it is proven that there is one.
@@ -202,20 +181,9 @@ class AlphaPiece:
         found = self.held(codes) if found is None else found
         return None if found is None else arc_of(self.whole, codes, found, errors)
 
-    def meets(
-        self,
-        arc: LeafArc,
-        point: tuple[Fraction, Codes],
-        given: AlphaProblem,
-        curve: SolutionCurve,
-    ) -> bool:
-        """True if the only root of a leaf at some alpha of the piece is on an arc, and in the box of a curve."""
-        at, root = self.root_at(*point)
-        return root is not None and arc.has(root, point[1]) and lies_in(at.place(root, given), curve)
-
     def root_at(self, alpha: Fraction, codes: Codes) -> tuple[AlphaPiece, SpaceRoot | None]:
         """The only root of a leaf at some alpha of the piece, and that alpha as a piece; None where there is none."""
-        at = self.point_at(alpha)
+        at = self.over(alpha, alpha)
         # beyond the piece nothing is known of friction, and it may vanish at an end
         held = self.low <= alpha <= self.high and is_complete(at.whole, codes)
         found = at.held(codes) if held else None
@@ -273,7 +241,7 @@ def lies_in(place: Ball | None, curve: SolutionCurve, errors: float = 1.0) -> bo
 
     ``errors``: 1 proves, a writer of proofs takes more.
     """
-    return place is not None and curve.holds(place, 1.0 - (errors - 1.0) * _MARGIN)
+    return place is not None and curve.holds(place, 1.0 - (errors - 1.0) * MARGIN)
 
 
 def lie_along(ends: Sequence[Ball], curves: Sequence[SolutionCurve], errors: float = 1.0) -> bool:
@@ -304,13 +272,6 @@ def _between(low: Ball, high: Ball, share: float) -> Ball:
     """A ball of (1 - share) x + share y for all x and y of two balls."""
     rest = 1.0 - share
     return low * Ball.exact(np.array(rest)) + high * Ball.exact(np.array(share))
-
-
-def _inverse(F: Ball) -> Ball:
-    """1 / F of positive numbers."""
-    inverse = 1.0 / F.mid
-    # |1 / x - 1 / m| = |x - m| / (x m)
-    return Ball(inverse, (F.rad / (F.mid - F.rad) * inverse + 4 * UNIT * inverse) * SAFE)
 
 
 # -- arcs of leaves ----------------------------------------------------------------------------------------------------
@@ -355,7 +316,7 @@ def arc_of(system: EnclosedSpace, codes: Sequence[int], found: SpaceRoot | Open,
     errors : 1 proves; a writer of proofs takes more
     """
     with np.errstate(over="ignore", invalid="ignore", divide="ignore"):
-        leaf, box = Leaf(system, codes), (found.angle, found.angle_rad, 1.0 + (errors - 1.0) * _MARGIN)
+        leaf, box = Leaf(system, codes), (found.angle, found.angle_rad, 1.0 + (errors - 1.0) * MARGIN)
         arc = _arc_in(leaf, *box)
         loosened = leaf.loosened() if arc is None else None
         return arc if loosened is None else _arc_in(loosened, *box)
@@ -372,7 +333,7 @@ def _box_of_all(leaf: Leaf, angle: Floats, radius: Floats) -> tuple[Floats, Floa
 def _arc_in(leaf: Leaf, angle: Floats, radius: Floats, errors: float) -> LeafArc | None:
     """The arc, if every condition holds all along it or changes its sign once at most.
 
-    Zeros z = (psi, s) of the equations are a graph over one of these unknowns, z_k: with (12.22d), u being the other
+    Zeros z = (psi, s) of the equations are a graph over one of these unknowns, z_k: with (12.22), u being the other
     ones, the right-hand side maps a box of u into its interior for every z_k, so that there is one zero for each of
     them, and these are an arc. A normal force that is left free is between psi and s, and so are rigid modes that the
     equations leave free. ``angle``, ``radius``: a box that holds the directions of all solutions.
@@ -393,8 +354,7 @@ def _arc_in(leaf: Leaf, angle: Floats, radius: Floats, errors: float) -> LeafArc
         if state is None or not state.whole_J.finite:
             return None
         room, reach = sizes[others], Ball(np.zeros(1), sizes[k : k + 1])[0]
-        left, along, start = around_middle(leaf, Y, k, (angle, radius), (state, point))
-        beside = left @ Ball(np.zeros(q), room) + start
+        left, along, beside = around_middle(leaf, Y, k, (angle, radius), (state, point))
         needed = (beside + along * reach).size * errors
         if np.all(needed < room) or (k < q and not needed[-1] < 1.0):
             break

@@ -13,9 +13,8 @@ import numpy as np
 
 from enumsol.arithmetic.balls import SAFE, TINY, UNIT, Ball, gamma, upper_norm, upper_sum
 from enumsol.condensation.space_condensed import EnclosedSpace
-from enumsol.trusted.energy_bounds import energy_bounds, form_bounds
 from enumsol.trusted.floating_bounds import balanced, balancing, bounds_within
-from enumsol.trusted.quadratic_forms import QuadraticForm
+from enumsol.trusted.quadratic_forms import QuadraticForm, energy_bounds, form_bounds
 from enumsol.trusted.space.sector_rows import FORBIDDEN, NONNEGATIVE, OF_DISCS, row_sign, row_terms
 
 if TYPE_CHECKING:
@@ -36,7 +35,6 @@ class Bounding(Protocol):
         """See ``space_margin``."""
 
 
-@np.errstate(over="ignore", invalid="ignore")
 def space_margin(
     within: EnclosedSpace | Bounding, codes: Sequence[int], rows: Sequence[Row], values: Floats, errors: float = 1.0
 ) -> float:
@@ -47,26 +45,21 @@ def space_margin(
     """
     if not isinstance(within, EnclosedSpace):
         return within.margin(codes, rows, values, errors)
-    added = Multiplied.of(within, codes, rows, values)
-    if added is None:
-        return -np.inf
-    first = _bound(within, added.y, added.c, errors)
-    y = None if first > 0 else _at_balance(within, added, errors)
-    return first if y is None else max(first, _bound(within, y, added.c, errors, at_balance=True))
+    return swept_margin((within,), within, codes, rows, (values,), errors)
 
 
 @np.errstate(over="ignore", invalid="ignore")
 def swept_margin(
-    ends: tuple[EnclosedSpace, EnclosedSpace],
+    ends: Sequence[EnclosedSpace],
     middle: EnclosedSpace,
     codes: Sequence[int],
     rows: Sequence[Row],
-    values: tuple[Floats, Floats],
+    values: Sequence[Floats],
     errors: float = 1.0,
 ) -> float:
-    """Lower bound between two systems, with multipliers between those of both ends: the least number of (12.21a).
+    """Lower bound between two systems, with multipliers between those of both ends: the least number of (12.19).
 
-    Of a body that nothing holds that of (14.19). Or that of an end, if it is not positive.
+    Of a body that nothing holds that, too. Or that of an end, if it is not positive; and of one system that.
 
     Parameters
     ----------
@@ -80,6 +73,8 @@ def swept_margin(
 
     def bound(y: Sequence[Ball], *, at_balance: bool) -> float:
         least, parts = np.inf, list(zip(ends, y, known, strict=True))
+        if len(ends) == 1:
+            return _bound(middle, y[0], known[0].c, errors, at_balance=at_balance)
         z = _rounded(np.array([_balancing(end, there, added.c) for end, there, added in parts]))
         for (end, there, added), own in zip(parts, z, strict=True):
             least = min(least, _bound(end, there, added.c, errors, own, at_balance=at_balance))

@@ -10,7 +10,7 @@ from enumsol.model import sectors
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from enumsol.support.array_types import Indices
+    from enumsol.support.array_types import Floats, Indices
 
 
 OPEN, STICK, SLIP_PLUS, SLIP_MINUS, FRICTIONLESS, CONTACT, UNDECIDED = range(7)
@@ -60,6 +60,25 @@ def is_within(code: int, over: int) -> bool:
         return code not in (OPEN, UNDECIDED)
     both = over > sectors.SECTORS and code > sectors.SECTORS
     return both and sectors.contains(over - sectors.SECTORS, code - sectors.SECTORS)
+
+
+def leaf_code(code: int, tau: Sequence[int], towards: Sequence[float] | Floats, level: int) -> int:
+    """The code of a node in a leaf, by its status: open, stick, and any other one for contact with slip.
+
+    Parameters
+    ----------
+    tau : places of both components, -1 where there is none
+    towards : (2,), of friction over its coefficients, or of the slip
+    level : of the sector
+    """
+    occurs = [k for k in range(2) if tau[k] >= 0]
+    if code == OPEN or not occurs:
+        return OPEN if code == OPEN else FRICTIONLESS
+    if code == STICK:
+        return STICK
+    if len(occurs) == 1:
+        return SLIP_PLUS if towards[occurs[0]] > 0 else SLIP_MINUS
+    return sectors.SECTORS + sectors.holding(towards, level)
 
 
 @lru_cache(maxsize=_KEPT)

@@ -21,7 +21,7 @@ from enumsol.condensation.enclosure import NotEnclosedError, RigidRows
 from enumsol.condensation.space_condensed import node_friction
 from enumsol.model.sectors import SECTORS
 from enumsol.trusted.space.krawczyk import Contraction, NaturalMap
-from enumsol.trusted.space.natural_map import Directions, Discs, are_steps, upper_product
+from enumsol.trusted.space.natural_map import Discs, are_steps, outwards, upper_product
 from enumsol.trusted.space.sector_rows import FRICTIONLESS, OPEN, STICK
 
 if TYPE_CHECKING:
@@ -231,45 +231,32 @@ class AlphaProblem:
         """Coefficients for all alpha of a ball, (p,)."""
         return Ball.exact(self.F0) + alpha * Ball.exact(self.F1)
 
-    def past(self, z: Ball, along: Ball, half: float, side: Array) -> Ball:
-        """Bounds of |z_t| - F z_n of every node, (p,), at all (z, alpha) + t along + s with |t| <= half, |s| <= side.
+    def lengths(self, z: Ball) -> tuple[Array, Array]:
+        """Bounds of |z_t| of every node at all (z, alpha) of a ball, (p,) each; the lower ones may be negative."""
+        tangent = self.discs(z[-1]).tangents(z[:-1])
+        length, away = np.linalg.norm(tangent.mid, axis=1), upper_norm(tangent.rad, axis=1) * SAFE
+        rounded = 8 * UNIT * length + TINY
+        return length - away - rounded, length + away + rounded
 
-        By derivatives, so that changes of |z_t| and of F z_n along t cancel; without bounds where z_t may vanish.
+    def possible(self, z: Ball, gap: Ball | None = None) -> tuple[frozenset[int], ...]:
+        """The statuses that every node may have at arguments (z, alpha) of P in a ball.
+
+        ``gap``: bounds of |z_t| - F z_n, (p,), if more is known of it than the ball tells.
         """
-        p, m = self.p, self.m
-        near = Ball(z.mid, (z.rad + along.size * half + side) * SAFE)
-        plain = self.discs(near[m])
-        F1 = Ball.exact(self.F1)
-        with np.errstate(all="ignore"):
-            at = Directions.of(plain.tangents(near[:m]))
-        known = (at.least > 0) & (plain.F.mid > plain.F.rad * SAFE)
-        e, pushed = Ball(at.e, np.where(known[:, None], at.turn, 0.0)), F1 * near[:p]
-        slope = -(plain.F * along[:p]) - pushed * along[m]
-        moved = plain.F.size * side[:p] + pushed.size * side[m]
-        for k in (0, 1):
-            has = self.places[:, k] >= 0
-            there, rate = self.places[has, k], e[has, k]
-            slope[has] = slope[has] + rate * along[there]
-            moved[has] += rate.size * side[there]
-        tangent = plain.tangents(z[:m])
-        length = np.linalg.norm(tangent.mid, axis=1)
-        length = Ball(length, (upper_norm(tangent.rad, axis=1) + 8 * UNIT * length) * SAFE + TINY)
-        here = length - self.friction(z[m]) * z[:p] + Ball(np.zeros(p), np.full(p, half)) * slope
-        return Ball(here.mid, np.where(known & np.isfinite(here.mid), (here.rad + moved) * SAFE + TINY, np.inf))
+        p, rubs, (least, most) = self.p, np.any(self.places >= 0, axis=1), self.lengths(z)
+        gap = Ball(np.zeros(p), np.full(p, np.inf)) if gap is None else gap
+        (low, high), (F_low, F_high) = outwards(z[:p]), outwards(self.friction(z[-1]))
+        touches, away = high >= 0, np.abs(gap.mid) > gap.rad * SAFE
+        sticks = touches & rubs & ~(away & (gap.mid > 0)) & (least <= np.maximum(F_high, 0.0) * high * SAFE + TINY)
+        beyond = (F_low < 0) | (most >= F_low * np.maximum(low, 0.0) / SAFE - TINY)
+        slips = touches & rubs & ~(away & (gap.mid < 0)) & beyond
+        codes = OPEN, FRICTIONLESS, STICK, SLIP
+        found = np.column_stack([low <= 0, touches & ~rubs, sticks, slips]).tolist()
+        return tuple(frozenset(code for code, may in zip(codes, node, strict=True) if may) for node in found)
 
     def statuses(self, z: Ball) -> tuple[int | None, ...]:
         """The status that every node has strictly at all arguments (z, alpha) of P, None where it has none."""
-        p, rubs, plain = self.p, np.any(self.places >= 0, axis=1), self.discs(z[-1])
-        low, high = z.mid[:p] - z.rad[:p] * SAFE, z.mid[:p] + z.rad[:p] * SAFE
-        tangent = plain.tangents(z[:-1])
-        length, away = np.linalg.norm(tangent.mid, axis=1), upper_norm(tangent.rad, axis=1)
-        least, most = (length - away) / SAFE - 8 * UNIT * length, (length + away) * SAFE + 8 * UNIT * length
-        F_low, F_high = (plain.F.mid - plain.F.rad) / SAFE, (plain.F.mid + plain.F.rad) * SAFE
-        touches = low > 0
-        sticks = touches & rubs & (F_low > 0) & (most < F_low * low / SAFE)
-        slips = touches & rubs & ~sticks & (least > np.maximum(F_high, 0.0) * high * SAFE)
-        codes = np.select([high < 0, touches & ~rubs, sticks, slips], [OPEN, FRICTIONLESS, STICK, SLIP], -1)
-        return tuple(None if code < 0 else code for code in codes.tolist())
+        return tuple(min(codes) if len(codes) == 1 else None for codes in self.possible(z))
 
 
 def _ratios(problem: ProblemData) -> Ball:
@@ -372,7 +359,7 @@ class SolutionCurve:
         ``share`` is of the size of that set; what a ball leaves of the box is bounded by every number of the ball once.
         """
         found, unit = self.found, Ball.exact(1.0 / self.problem.unit)
-        if not self.parameter(x).size <= share * self.box.half:
+        if not parameter_in(self.box, x).size <= share * self.box.half:
             return False
         off = unit * (x - Ball.exact(self.box.centre))
         turn, shares_of, rest_of = self._beside
@@ -396,10 +383,6 @@ class SolutionCurve:
         turn = Ball.exact(np.eye(len(near.d))) - Ball.exact(near.d[:, None]) * Ball.exact(near.border)
         shares_of = Ball.exact(np.asarray(np.linalg.pinv(G), dtype=np.float64)) @ turn
         return turn, shares_of, turn - Ball.exact(G) @ shares_of
-
-    def parameter(self, x: Ball) -> Ball:
-        """Bounds of t at points within a ball."""
-        return parameter_in(self.box, x)
 
     @property
     def rises(self) -> int:

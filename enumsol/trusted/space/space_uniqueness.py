@@ -39,11 +39,11 @@ from enumsol.trusted.space.sector_rows import (
 from enumsol.trusted.uniqueness_forms import Multipliers, RootForm, RootReference, UniqueForm
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Iterator, Sequence
     from fractions import Fraction
     from typing import Self
 
-    from enumsol.condensation.space_condensed import EnclosedSpace, PieceSpace
+    from enumsol.condensation.space_condensed import EnclosedSpace
     from enumsol.support.array_types import Codes, Floats, Mask
     from enumsol.trusted.space.curve_runs import CurveParts
 
@@ -58,7 +58,7 @@ EQUATION_WEIGHTS = 16.0, 1024.0
 
 @dataclass(frozen=True)
 class LooseSolution:
-    """One solution of a problem as balls; its statuses need not be known.
+    """One solution of a problem, or its only one, as balls; its statuses need not be known.
 
     Attributes
     ----------
@@ -109,13 +109,9 @@ def displacements(system: EnclosedSpace, y: Ball) -> Ball:
     return Ball(system.g, system.g_rad) - (Ball(system.S, system.S_rad) @ y[:, None])[:, 0]
 
 
-class OnlySolution(LooseSolution):
-    """The one solution of a problem."""
-
-
 def only_solution_in_space(
     system: EnclosedSpace, numbers: Floats, normal: Floats, errors: float = 1.0
-) -> OnlySolution | None:
+) -> LooseSolution | None:
     """The only solution near a point, or None where that is not proven.
 
     Parameters
@@ -134,23 +130,6 @@ def only_solution_in_space(
     with np.errstate(all="ignore"):
         weights = SpaceWeights.of(system, numbers)
         return None if weights is None else _enclosed(system, weights, normal, errors)
-
-
-def only_root(system: EnclosedSpace, numbers: Floats, codes: Sequence[int], errors: float = 1.0) -> SpaceRoot | None:
-    """The regular root of a leaf, if it is proven that it has one and that there is no other solution at all.
-
-    Parameters and errors as for ``only_solution_in_space``; ``codes`` are those of the leaf.
-    """
-    if not is_complete(system, codes):
-        return None
-    with np.errstate(all="ignore"):
-        weights = SpaceWeights.of(system, numbers)
-        form = None if weights is None else weights.form(system)
-        root = None if form is None else settle(system, codes)
-        # the degree of a problem is +1
-        if weights is None or form is None or not isinstance(root, SpaceRoot) or root.index != 1:
-            return None
-        return root if form.serves(weights.distances(system, root.y, root.w), errors) else None
 
 
 def lone_root(
@@ -173,12 +152,18 @@ def lone_root(
     if not is_complete(system, leaf) or not all(map(_allows, codes, leaf)):
         return None
     with np.errstate(all="ignore"):
-        root, weights = settle(system, leaf), SpaceWeights.of(system, numbers)
-        if weights is None or not isinstance(root, SpaceRoot):
+        weights, root = SpaceWeights.of(system, numbers), None
+        if weights is None:
             return None
-        off = weights.distances(system, root.y, root.w)
-        forms = (weights.form(system, equations(system, codes, weight)) for weight in EQUATION_WEIGHTS)
-        return root if any(form is not None and form.serves(off, errors) for form in forms) else None
+        for rows in equations_tried(system, codes):
+            form = weights.form(system, rows)
+            root = settle(system, leaf) if form is not None and root is None else root
+            # the degree of a problem is +1
+            if form is None or not isinstance(root, SpaceRoot) or (rows is None and root.index != 1):
+                continue
+            if form.serves(weights.distances(system, root.y, root.w), errors):
+                return root
+    return None
 
 
 def _allows(code: int, final: int) -> bool:
@@ -209,6 +194,14 @@ def equations(system: EnclosedSpace, codes: Sequence[int], weight: float) -> Bal
     return Ball.joined(rows, Ball.exact(weight * np.eye(len(system.g))[separate]))
 
 
+def equations_tried(system: EnclosedSpace, codes: Sequence[int]) -> Iterator[Ball | None]:
+    """Rows of ``equations``, with every weight that is tried; None where no status is assigned."""
+    if all(code == UNDECIDED for code in codes):
+        yield None
+    else:
+        yield from (equations(system, codes, weight) for weight in EQUATION_WEIGHTS)
+
+
 def is_complete(system: EnclosedSpace, codes: Sequence[int]) -> bool:
     """True if every node has a final code that it can have."""
     tangents = np.sum(system.tau >= 0, axis=1).tolist()
@@ -232,8 +225,8 @@ class SpaceWeights:
     mu, kappa, wide : (p,) arrays
         ``wide`` is positive where the form serves any theta.
     nu, theta : (p, 2) arrays
-    off : (p,) array
-        theta stands for one that is no farther away: where ``whole``, for that of length one.
+    off : (p, 2) array
+        theta stands for one whose components are no farther away: where ``whole``, for that of length one.
     whole : (p,) bool array
     """
 
@@ -264,23 +257,17 @@ class SpaceWeights:
         wrong |= ~whole & (square > 1.0 - _UNIT_LENGTH)
         wrong |= (wide > 0) & (np.any(theta != 0, axis=1) | np.all(system.tau < 0, axis=1))
         # | |theta| - 1 | <= | |theta|^2 - 1 |
-        off = np.where(whole, (np.abs(square - 1.0) + 8 * UNIT) * SAFE, 0.0)
+        off = np.where(whole, (np.abs(square - 1.0) + 8 * UNIT) * SAFE, 0.0)[:, None] * (system.tau >= 0)
         return None if np.any(wrong) else cls(mu, kappa, wide, nu, theta, off, whole)
 
-    def turn(self, system: EnclosedSpace) -> Ball:
-        """theta over the units of the tau, of shape (p, 2), with that of length one for which it stands."""
-        # units are powers of two: what is rounded is less than TINY
-        unit = np.where(system.tau >= 0, system.unit[system.tau], 1.0)
-        turn = Ball(self.theta / unit, self.off[:, None] / unit * SAFE + TINY)
-        known = (system.tau < 0) | ((self.theta == 0) & (self.off == 0)[:, None])
-        return Ball(turn.mid, np.where(known, 0.0, turn.rad))
+    @property
+    def psi(self) -> Ball:
+        """theta, (p, 2), with that of length one for which it stands."""
+        return Ball(self.theta, self.off)
 
     def multipliers(self, system: EnclosedSpace) -> Multipliers:
         """D of all nodes."""
-        # units are powers of two: what is rounded is less than TINY
-        unit = np.where(system.tau >= 0, system.unit[system.tau], 1.0)
-        push = Ball(self.nu * unit, np.where(self.nu == 0, 0.0, TINY))
-        return Multipliers(system.tau, self.mu, self.kappa, self.turn(system), push, unit)
+        return _multipliers(system, self.mu, self.kappa, self.nu, self.psi)
 
     def form(self, system: EnclosedSpace, held: Ball | None = None) -> UniqueForm | None:
         """Q of theory, (6.9); None where it is not proven definite, or not with the squares of some rows."""
@@ -289,48 +276,59 @@ class SpaceWeights:
         S, wide = Ball(system.S, system.S_rad), self.wide > 0
         return UniqueForm.of(S, self.multipliers(system), np.where(wide, 1.0, 0.0), self.wide, held)
 
+    def gaps_serve(self, system: EnclosedSpace, w: Ball) -> Mask:
+        """Mask of nodes without load whose theta serves for all w in a ball, by their gaps (theory, (6.8))."""
+        unit, p, ones = system.tau_units, len(self.mu), Ball.exact(np.ones(len(self.mu)))
+        slip = Ball(system.tangential(w.mid) / unit, system.tangential(w.rad) / unit * SAFE + TINY)
+        return _gaps_serve(self, ones.mid, self.psi, ones, (-(w.mid[:p] + w.rad[:p]), slip))
+
     def distances(self, system: EnclosedSpace, y: Ball, w: Ball) -> Floats:
-        """``off_at`` of all nodes, (p,)."""
-        return np.array([self.off_at(system, i, y, w) for i in range(len(system.tau))])
+        """Upper bounds of distances of theta from one that serves a solution in balls, (p,); infinite where open."""
+        p, has, unit = len(self.mu), system.tau >= 0, system.tau_units
+        scale = system.slip_scale[:, None] / unit
+        v, v_rad = system.tangential(w.mid) * scale, system.tangential(w.rad) * scale * SAFE + TINY
+        length, away = np.linalg.norm(v, axis=1), upper_norm(v_rad, axis=1)
+        # it slides, in a direction that is off by 2 away / length at most
+        slides = length * (1.0 - 32 * UNIT) > away * SAFE
+        divisor = np.where(slides, length, 1.0)
+        apart = np.linalg.norm(v / divisor[:, None] - self.theta, axis=1)
+        apart = (apart + np.where(np.all(has, axis=1), 2.0 * away / divisor, 0.0)) * SAFE + 32 * UNIT
+        off, low, most = np.where(slides, apart, np.inf), (y.mid[:p] - y.rad[:p]) / SAFE, system.disc_scale
+        # |tau / lambda_n - theta| = |tau - theta lambda_n| / lambda_n
+        scale, loaded = unit * most[:, None], low > 0
+        tau = Ball(system.tangential(y.mid) * scale, system.tangential(y.rad) * scale * SAFE + TINY)
+        left = tau - Ball.exact(self.theta) * Ball(y.mid[:p] * most, y.rad[:p] * most)[:, None]
+        apart = upper_norm(left.size + TINY, axis=1) / (np.where(loaded, low, 1.0) * most) * SAFE * SAFE
+        off = np.where(loaded, np.minimum(off, apart), off)
+        return np.where(~np.any(has, axis=1) | (self.wide > 0) | self.gaps_serve(system, w), 0.0, off)
 
-    def gap_serves(self, system: EnclosedSpace, i: int, w: Ball) -> bool:
-        """True if theta of a node without load serves for all w in a ball, by its gap (theory, (6.8))."""
-        places = system.tau[i]
-        t, theta = places[places >= 0], self.theta[i][places >= 0]
-        gap = -float(w.mid[i] + w.rad[i]) / SAFE
-        if not gap > 0:
-            return False
-        unit = system.unit[t]
-        v = Ball(w.mid[t] / unit, w.rad[t] / unit * SAFE + TINY)
-        slip = float(upper_norm(v.size)) - float(theta @ v.mid) + float(np.abs(theta) @ v.rad)
-        slip += 32 * UNIT * float(np.sum(v.size)) + float(self.off[i] * np.sum(v.size))
-        room = (self.mu[i] - float(upper_norm(self.nu[i])) * SAFE) / SAFE
-        return bool(room * gap / SAFE >= self.kappa[i] * slip * SAFE * SAFE + TINY)
 
-    def off_at(self, system: EnclosedSpace, i: int, y: Ball, w: Ball) -> float:
-        """Largest distance of theta from one that serves a solution within a node's balls; infinite if that is open."""
-        places = system.tau[i]
-        t, theta = places[places >= 0], self.theta[i][places >= 0]
-        if not len(t) or self.wide[i] > 0:
-            return 0.0
-        if w.mid[i] + w.rad[i] < 0 and self.gap_serves(system, i, w):
-            return 0.0
-        off, unit = np.inf, system.unit[t]
-        scale = system.slip_scale[i] / unit
-        v, v_rad = w.mid[t] * scale, float(upper_norm(w.rad[t] * scale * SAFE + TINY))
-        length = float(np.linalg.norm(v))
-        if length * (1.0 - 32 * UNIT) > v_rad * SAFE:
-            # it slides, in a direction that is off by 2 v_rad / length at most
-            apart = np.linalg.norm(v / length - theta) + (2.0 * v_rad / length if len(t) > 1 else 0.0)
-            off = float(apart * SAFE + 32 * UNIT)
-        low = float(y.mid[i] - y.rad[i]) / SAFE
-        if low > 0:
-            # |tau / lambda_n - theta| = |tau - theta lambda_n| / lambda_n
-            scale, most = unit * system.disc_scale[i], system.disc_scale[i]
-            tau, n = Ball(y.mid[t] * scale, y.rad[t] * scale * SAFE + TINY), Ball(y.mid[i] * most, y.rad[i] * most)
-            apart = upper_norm((tau - Ball.exact(theta) * n).size + TINY) / (low * most)
-            off = min(off, float(apart * SAFE * SAFE))
-        return off
+def _multipliers(system: EnclosedSpace, mu: Floats, kappa: Floats, nu: Floats, psi: Ball) -> Multipliers:
+    """D of all nodes, psi being theta times the radii of the discs."""
+    # units are powers of two: what is rounded is less than TINY
+    unit, known = system.tau_units, (psi.mid == 0) & (psi.rad == 0)
+    turn = Ball(psi.mid / unit, np.where(known, 0.0, psi.rad / unit * SAFE + TINY))
+    return Multipliers(system.tau, mu, kappa, turn, Ball(nu * unit, np.where(nu == 0, 0.0, TINY)), unit)
+
+
+def _gaps_serve(
+    numbers: SpaceWeights | PieceWeights, scale: Floats, psi: Ball, r: Ball, moved: tuple[Floats, Ball]
+) -> Mask:
+    """Mask of nodes whose gap lets psi itself serve: (mu - r |nu|) |w_n| >= kappa (r |v| - psi . v).
+
+    Parameters
+    ----------
+    scale : (p,) array, by which slips are multiplied
+    psi, r : Balls of shapes (..., p, 2) and (..., p), |psi| being at most r
+    moved : bounds of -w_n from below, (..., p), and slips, (..., p, 2)
+    """
+    gap, slip = moved
+    gap, length, along = np.maximum(gap, 0.0) / SAFE, upper_norm(slip.size, axis=-1), psi * slip
+    ahead = along[..., 0] + along[..., 1]
+    needed = r.size * length * SAFE - (ahead.mid - ahead.rad * SAFE) + 16 * UNIT * (r.size * length + ahead.size)
+    room = numbers.mu - upper_norm(numbers.nu, axis=1) * r.size * SAFE - 4 * UNIT * numbers.mu
+    needed = numbers.kappa * scale * needed * SAFE * SAFE + TINY
+    return np.asarray((gap > 0) & (room > 0) & (room * gap / SAFE >= needed))
 
 
 def moderate_units(unit: Floats) -> bool:
@@ -344,7 +342,7 @@ def in_range(system: EnclosedSpace) -> bool:
     return moderate_units(system.unit) and bool(np.all((discs.mid == 1.0) & (discs.rad == 0)))
 
 
-def _enclosed(system: EnclosedSpace, numbers: SpaceWeights, normal: Floats, errors: float) -> OnlySolution | None:
+def _enclosed(system: EnclosedSpace, numbers: SpaceWeights, normal: Floats, errors: float) -> LooseSolution | None:
     """The only solution by its distance from a point, None where it is not proven to be the only one."""
     tau, p, form = system.tau, len(system.tau), numbers.form(system)
     n = np.maximum(normal, 0.0)
@@ -366,12 +364,12 @@ def _enclosed(system: EnclosedSpace, numbers: SpaceWeights, normal: Floats, erro
         y.rad[[i, *tau[i][tau[i] >= 0]]] = 0.0
     w = displacements(system, y)
     alone = form.serves(numbers.distances(system, y, w), errors)
-    return OnlySolution.of(system, y, w, 1) if alone else None
+    return LooseSolution.of(system, y, w, 1) if alone else None
 
 
 def _change(system: EnclosedSpace, numbers: SpaceWeights, turn: Ball, n: Floats, w: Ball) -> Floats:
     """Bound of the change of the load, row by row, that makes a point with these lambda_n a solution."""
-    p, change, apart = len(n), w.size.copy(), n == 0
+    p, change, apart, serves = len(n), w.size.copy(), n == 0, numbers.gaps_serve(system, w)
     change[:p][apart] = np.maximum(w.mid[:p] + w.rad[:p], 0.0)[apart] * SAFE
     for i, places in enumerate(system.tau):
         t = places[places >= 0]
@@ -380,7 +378,7 @@ def _change(system: EnclosedSpace, numbers: SpaceWeights, turn: Ball, n: Floats,
             unit, theta = system.unit[t], turn[i][places >= 0]
             along = max(float(numbers.theta[i][places >= 0] @ (w.mid[t] / unit)), 0.0)
             change[t] = (w[t] - theta * Ball.exact(along * unit * unit)).size
-        elif apart[i] and numbers.gap_serves(system, i, w):
+        elif apart[i] and serves[i]:
             change[t] = 0.0
     return change
 
@@ -409,7 +407,7 @@ class PieceWeights:
     thetas: tuple[Floats, Floats]
 
     @classmethod
-    def of(cls, system: PieceSpace, numbers: Floats) -> PieceWeights | None:
+    def of(cls, system: EnclosedSpace, numbers: Floats) -> PieceWeights | None:
         """From one array: mu and kappa of all nodes, then nu and both thetas of all tau, in the order of y; or None."""
         p, m = len(system.tau), len(system.g)
         if numbers.shape != (2 * p + 3 * (m - p),) or not np.all(np.isfinite(numbers)):
@@ -421,15 +419,13 @@ class PieceWeights:
             right = (mu > 0) & (kappa > 0) & (upper_norm(nu, axis=1) * system.largest_discs * SAFE <= mu)
         return cls(mu, kappa, nu, (low, high)) if np.all(right) else None
 
-    def multipliers(self, system: PieceSpace, psi: Ball) -> Multipliers:
+    def multipliers(self, system: EnclosedSpace, psi: Ball) -> Multipliers:
         """D of all nodes at an end of the piece."""
-        unit = np.where(system.tau >= 0, system.unit[system.tau], 1.0)
-        turn = Ball(psi.mid / unit, psi.rad / unit * SAFE + TINY * (system.tau >= 0))
-        return Multipliers(system.tau, self.mu, self.kappa, turn, Ball(self.nu * unit, TINY * (self.nu != 0)), unit)
+        return _multipliers(system, self.mu, self.kappa, self.nu, psi)
 
 
 def only_on_curve(
-    system: PieceSpace,
+    system: EnclosedSpace,
     piece: tuple[Fraction, Fraction],
     codes: Sequence[int],
     numbers: Floats,
@@ -440,7 +436,7 @@ def only_on_curve(
 
     Parameters
     ----------
-    system : PieceSpace
+    system : EnclosedSpace
         Over the piece.
     piece : its ends
     codes : (partial) status codes; a sector counts as contact
@@ -463,9 +459,10 @@ def only_on_curve(
         lost = np.where(off > 0, weights.kappa * off * ends[0].slip_sizes(S) + TINY, 0.0)
         if not np.all(np.isfinite(lost)):
             return False
-        assigned = any(code != UNDECIDED for code in codes)
-        held = [equations(system, codes, weight) for weight in EQUATION_WEIGHTS] if assigned else [None]
-        return any(all(UniqueForm.of(S, end, off, lost, rows) is not None for end in ends) for rows in held)
+        return any(
+            all(UniqueForm.of(S, end, off, lost, rows) is not None for end in ends)
+            for rows in equations_tried(system, codes)
+        )
 
 
 def _times(theta: Floats, discs: Ball) -> Ball:
@@ -484,7 +481,11 @@ def _shares(piece: tuple[Fraction, Fraction], alpha: Ball) -> Ball:
 
 
 def how_far_off(
-    system: PieceSpace, piece: tuple[Fraction, Fraction], weights: PieceWeights, psi: Sequence[Ball], parts: CurveParts
+    system: EnclosedSpace,
+    piece: tuple[Fraction, Fraction],
+    weights: PieceWeights,
+    psi: Sequence[Ball],
+    parts: CurveParts,
 ) -> Floats:
     """Bound of the distance of psi from r theta with a theta that serves the curve's solution, (p,), at all alphas.
 
@@ -501,22 +502,11 @@ def how_far_off(
     apart = upper_norm((Ball.exact(theta) * r[:, :, None] - at).size, axis=2) + r.size * far
     unknown = upper_norm(at.size, axis=2) + r.size
     off = np.minimum(np.where(np.isfinite(apart), apart, np.inf), unknown) * SAFE * SAFE
-    off = np.where(_gap_serves(weights, reference, at, r, parts), 0.0, off)
-    return np.where(rubs, np.max(off, axis=0), 0.0)
-
-
-def _gap_serves(weights: PieceWeights, reference: Floats, psi: Ball, r: Ball, parts: CurveParts) -> Mask:
-    """Mask of nodes whose gap lets psi itself serve, (N, p): (mu - r |nu|) |w_n| >= kappa (r |v| - psi . v)."""
     inside = np.all([upper_norm(theta, axis=1) <= 1.0 for theta in weights.thetas], axis=0)
     normal, slip = parts.slips
-    gap = np.where(parts.open, -(normal.mid + normal.rad * SAFE), 0.0) / SAFE
-    length = upper_norm(slip.size, axis=2)
-    along = psi * slip
-    ahead = along[:, :, 0] + along[:, :, 1]
-    needed = r.size * length * SAFE - (ahead.mid - ahead.rad * SAFE) + 16 * UNIT * (r.size * length + ahead.size)
-    room = weights.mu - upper_norm(weights.nu, axis=1) * r.size * SAFE - 4 * UNIT * weights.mu
-    needed = weights.kappa * reference * needed * SAFE * SAFE + TINY
-    return np.asarray(inside & (gap > 0) & (room > 0) & (room * gap / SAFE >= needed))
+    gap = np.where(parts.open, -(normal.mid + normal.rad * SAFE), 0.0)
+    off = np.where(inside & _gaps_serve(weights, reference, at, r, (gap, slip)), 0.0, off)
+    return np.where(rubs, np.max(off, axis=0), 0.0)
 
 
 @dataclass(frozen=True)
@@ -582,10 +572,11 @@ class LeafReference(RootReference[Row]):
     def _costs_of_changes(self, weights: SpaceWeights, within: ForceBound) -> Floats | None:
         """Least costs of changes of w, (m,), of a root without slip; None where one may be nothing."""
         cost, system = np.zeros(len(self.system.g)), self.system
+        serves = weights.gaps_serve(system, self.root.w)
         for i, (code, places) in enumerate(zip(self.selection, system.tau, strict=True)):
             t = places[places >= 0]
             if code == OPEN:
-                if len(t) and not weights.gap_serves(system, i, self.root.w):
+                if len(t) and not serves[i]:
                     return None
                 continue
             cost[i] = max(float(self.root.y.mid[i] - self.root.y.rad[i]) / SAFE, 0.0)

@@ -19,8 +19,6 @@ if TYPE_CHECKING:
 
 #: Cosine and sine of numerical libraries, and what is made of two of them here, are off by no more.
 LIBRARY = 64 * UNIT
-#: How often derivatives over a box are bounded by their own derivatives.
-_ROUNDS = 2
 
 
 def turned_by(centre: Floats, angle: Floats) -> tuple[Floats, Floats]:
@@ -105,8 +103,9 @@ class AngleBox:
         across, along = (rows @ part for part in (self.across, self.along))
         middle = tuple(rows @ part for part in (point.across, point.along))
         more = (1.0 + gamma(2 * len(radius) + 8)) * SAFE
-        for _ in range(_ROUNDS):
-            # by (12.4a), and with g = share / (1 + s share), whose bounds are ``swept``,
+        # twice bounded by their own derivatives
+        for _ in range(2):
+            # by (12.8), and with g = share / (1 + s share), whose bounds are ``swept``,
             # dp_j / ds = p_j g_j - sum q_k g_k z_kj, and the same for q with t in place of z. Forces here are
             # 1 + s share times d or its turn; what needs them for d alone has that too, as the radii hold all s
             p, q = across.size, along.size
@@ -149,7 +148,7 @@ class Combined(NamedTuple):
     def loosened(self) -> tuple[Ball, Ball]:
         """Over a piece of alpha, those by angles and other free unknowns, (k, q, f), and by s and the latter, (k, f).
 
-        w is affine in them, and what forces along d and across it change w by does not depend on them (12.22f).
+        w is affine in them, and what forces along d and across it change w by does not depend on them (12.21).
         """
         box = self.box
         assert box.share is not None
