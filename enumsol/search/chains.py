@@ -5,7 +5,6 @@ Where the problem has one solution it is the whole graph (theory, section 7.15).
 
 from __future__ import annotations
 
-from copy import copy
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import TYPE_CHECKING
@@ -20,8 +19,10 @@ from enumsol.trusted.selection import Selection
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from enumsol.condensation.condensed import CondensedProblem, ScaledSystem
+    from enumsol.arithmetic.balls import Ball
+    from enumsol.condensation.condensed import ScaledSystem
     from enumsol.support.array_types import Codes, Floats
+    from enumsol.trusted.arcs.selection_balls import ArcSystem
 
 
 #: Where a chain begins, beside the end of its interval, by its length; steps to an event, and how close is near enough.
@@ -38,36 +39,26 @@ class Link:
 
 
 class LoadedSystem:
-    """The condensed problem as a function of alpha in fixed units, on one side of an alpha at which g vanishes.
+    """The condensed problem as a function of alpha in floats, the middle of balls.
 
     Parameters
     ----------
-    condensed : CondensedProblem
+    arcs : ArcSystem
     units : ScaledSystem
-        With the compliance and the units.
-    side : 1.0 or -1.0 above or below an alpha at which g vanishes: the load is +-g1; else 0.0
+        Of the body, or of that on springs, with the same units.
     start : callable, optional
         Gives the selection of a root at an alpha, or None; by default it is sought as of a body that is held.
     """
 
     def __init__(
         self,
-        condensed: CondensedProblem,
+        arcs: ArcSystem[Ball],
         units: ScaledSystem,
-        side: float,
         start: Callable[[float], Codes | None] | None = None,
     ) -> None:
-        self.S, self._units = units.S, units
-        self.F0, self.F1 = condensed.F0, condensed.F1
-        self.reach, self._start = np.zeros(0), start
-        slope = condensed.g1 / units.length
-        self.g0, self.g1 = (side * slope, np.zeros_like(slope)) if side else (condensed.g0 / units.length, slope)
-
-    def bordered(self, S: Floats, g: tuple[Floats, Floats], reach: Floats) -> LoadedSystem:
-        """System of a body that nothing holds, by its matrix (14.9) and load and bounds of q."""
-        found = copy(self)
-        found.S, (found.g0, found.g1), found.reach = S, g, reach
-        return found
+        self.S, self.g0, self.g1 = arcs.S.mid, arcs.g0.mid, arcs.g1.mid
+        self.F0, self.F1, self.reach = arcs.F0, arcs.F1, arcs.reach
+        self._units, self._start = units, start
 
     @property
     def p(self) -> int:

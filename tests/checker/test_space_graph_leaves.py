@@ -12,6 +12,7 @@ from enumsol import verify
 from enumsol.branches.space.space_graph import ByCurves
 from enumsol.gallery import wedge3d
 from enumsol.search.space.piece_proposals import ExaminedPiece
+from enumsol.support.deadlines import Deadline
 
 INTERVAL = Fraction(0), Fraction(1)
 #: Of a wedge, with a leaf that only its equations show to be without a root.
@@ -28,7 +29,7 @@ def leaf_by_leaf(p, seed):
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(ExaminedPiece, "numbers", lambda *_: None)
         patch.setattr(ExaminedPiece, "is_hopeful", lambda *_: False)
-        cover.search(max_nodes=100)
+        cover.run(100, Deadline(), None, None)
     return cover.problem, records_of(cover.proof())
 
 

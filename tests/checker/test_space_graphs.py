@@ -14,6 +14,7 @@ from enumsol import enumerate_roots, gallery, verify
 from enumsol.arithmetic.balls import Ball
 from enumsol.branches.space.space_graph import ByCurves
 from enumsol.search.space.curve_proposals import placed
+from enumsol.support.deadlines import Deadline
 from enumsol.trusted.space.solution_curve import AlphaProblem, lies_in
 
 INTERVAL = Fraction(0), Fraction(1)
@@ -22,7 +23,7 @@ INTERVAL = Fraction(0), Fraction(1)
 @functools.cache
 def covered(p, seed):
     cover = ByCurves(random_over_alpha(p, seed), INTERVAL)
-    cover.search(max_nodes=600)
+    cover.run(600, Deadline(), None, None)
     return cover
 
 
@@ -52,7 +53,7 @@ def test_a_proof_says_that_all_solutions_lie_on_its_curves(p, seed):
 @functools.cache
 def block_by_certificates():
     cover = ByCurves(gallery.block3d(1, 1, 1), (Fraction(1, 2), Fraction(1)))
-    cover.search(max_nodes=100)
+    cover.run(100, Deadline(), None, None)
     return cover
 
 
@@ -104,8 +105,8 @@ def test_a_block_has_one_curve_by_a_few_certificates(cells):
     """Statuses change dozens of times; the form holds through all of them."""
     problem = gallery.block3d(*cells)
     cover = ByCurves(problem, (Fraction(0), Fraction(2)))
-    cover.search(max_nodes=20)
-    assert (len(cover.chains), cover.gaps, cover.stopped) == (1, [], None)
+    cover.run(20, Deadline(), None, None)
+    assert (len(cover.chains), cover.gaps, cover.stop) == (1, [], None)
     assert {record.kind for record in cover.records} <= {"p", "k"}
     complete_report(problem, cover.proof())
     assert all(len(enumerate_roots(problem, alpha)) == 1 for alpha in (0.1, 0.3, 0.7, 1.5))
@@ -116,8 +117,8 @@ def test_a_flat_block_takes_one_node():
     """3, and with 5 x 5 cells 282, where mu and kappa of open nodes are the same."""
     problem = gallery.block3d(4, 2, 1)
     cover = ByCurves(problem, (Fraction(0), Fraction(2)))
-    cover.search(max_nodes=1)
-    assert (len(cover.chains), cover.gaps, cover.stopped) == (1, [], None)
+    cover.run(1, Deadline(), None, None)
+    assert (len(cover.chains), cover.gaps, cover.stop) == (1, [], None)
     complete_report(problem, cover.proof())
 
 

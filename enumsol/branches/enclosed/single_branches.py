@@ -169,12 +169,8 @@ class _Proposals:
         self._traced, self._whole, self._worker = traced, whole, worker
         self._side = traced.spans([(whole.a, whole.b)])[0][2]
         held = traced.problem.held
-        self._system = LoadedSystem(
-            traced.problem.on_springs.condensed, traced.units, self._side, None if held else self._root
-        )
-        if not held:
-            self._arcs = arcs = traced.system(self._side)
-            self._system = self._system.bordered(arcs.S.mid, (arcs.g0.mid, arcs.g1.mid), arcs.reach)
+        self._arcs = traced.system(self._side)
+        self._system = LoadedSystem(self._arcs, traced.units, None if held else self._root)
         self._chains = Chains(self._system, float(whole.b))
         # how far around a link the test goes, by the length of the interval: its ends are known in floats only
         self._around = 1e-9 * float(whole.b - whole.a)

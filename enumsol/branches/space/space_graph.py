@@ -39,7 +39,7 @@ from enumsol.trusted.space.sector_rows import leaf_code
 from enumsol.trusted.space.solution_curve import AlphaProblem
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterable, Iterator, Sequence
+    from collections.abc import Iterable, Iterator, Sequence
     from concurrent.futures import Executor
 
     from enumsol.branches.elements import Arc, Tick, Vertex
@@ -84,8 +84,6 @@ class ByCurves:
     failed : int
         Curves that were met and of no use.
     nodes : int
-    stopped : StopReason or None
-        Why the tree was not searched to its end.
     settled : bool
         The records say of the whole tree what is open.
     refused : list of str
@@ -105,7 +103,6 @@ class ByCurves:
     records: list[Record | OpenLeaf] = field(default_factory=list)
     failed: int = 0
     nodes: int = 0
-    stopped: StopReason | None = None
     settled: bool = False
     refused: list[str] = field(default_factory=list)
     stop: Stop | None = None
@@ -140,46 +137,34 @@ class ByCurves:
     # -- the search ------------------------------------------------------------------------------------------------
 
     def run(self, max_nodes: int | None, limits: Deadline, tick: Tick | None, executor: Executor | None) -> None:
-        """Search the interval."""
+        """Search the tree, and follow curves where it wants them (theory, section 12.9).
+
+        ``tick`` is called with the share that is done, ``executor`` as in ``branch_graph``.
+        """
         try:
             with within(limits):
-                self.search(max_nodes, tick, executor)
-            self.stop = None if self.stopped is None else Stop(self.stopped, self.nodes)
+                curves = Curves(self._given, self.interval)
+                tree = PieceTree(self.enclosure, self._units(), curves, max_nodes, tick)
+                self._search(tree, tree if executor is None else SpreadPieces(executor, tree))
+            self.stop = None if tree.stopped is None else Stop(tree.stopped, self.nodes)
         except NotEnclosedError as error:
             self.refused.append(str(error))
         except TimeOverError:
             self.stop = Stop(StopReason.TIME_LIMIT, self.nodes)
         self.searched = True
 
-    def search(
-        self,
-        max_nodes: int | None = None,
-        tick: Callable[[float], object] | None = None,
-        executor: Executor | None = None,
-    ) -> None:
-        """Search the tree, and follow curves where it wants them (theory, section 12.9).
-
-        ``tick`` is called with the share that is done, ``executor`` as in ``branch_graph``.
-
-        Raises
-        ------
-        NotEnclosedError
-            The data cannot be enclosed.
-        """
-        curves = Curves(self.enclosure, self.interval, final=self.failed >= _FAILURES)
-        tree = PieceTree(self.enclosure, self.interval, self._units(), curves, max_nodes, tick)
-        search = tree if executor is None else SpreadPieces(executor, tree)
+    def _search(self, tree: PieceTree, search: PieceTree | SpreadPieces) -> None:
         try:
             search.run()
             while tree.wanted is not None:
-                for x in self._points(curves) if tree.wanted.x is None else [tree.wanted.x]:
-                    self._follow(x, curves)
+                for x in self._points(tree.curves) if tree.wanted.x is None else [tree.wanted.x]:
+                    self._follow(x, tree.curves)
                 search.run()
         except TimeOverError:
             tree.stop_for_time()
         finally:
             search.end()
-            self.records, self.nodes, self.stopped = tree.records, tree.nodes, tree.stopped
+            self.records, self.nodes = tree.records, tree.nodes
             self.settled = tree.settled and bool(tree.records)
 
     def _follow(self, x: Floats, curves: Curves) -> None:

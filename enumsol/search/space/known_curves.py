@@ -21,21 +21,19 @@ from enumsol.search.space.curve_proposals import curve_point, placed, unplaced
 from enumsol.search.space.space_fathoming import without_sectors
 from enumsol.trusted.space.curve_runs import KnownCurve
 from enumsol.trusted.space.pieces import lie_along
-from enumsol.trusted.space.solution_curve import AlphaProblem
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Sequence
 
     from numpy.typing import NDArray
 
-    from enumsol.condensation.enclosure import CondensedEnclosure
     from enumsol.proof.records import Record
     from enumsol.search.space.piece_proposals import AlphaPoint, ExaminedPiece
     from enumsol.support.array_types import Codes, Floats, Mask
     from enumsol.trusted.space.curve_runs import CurveChain, CurveParts
     from enumsol.trusted.space.leaves import Open, SpaceRoot
     from enumsol.trusted.space.pieces import AlphaPiece, LeafArc
-    from enumsol.trusted.space.solution_curve import SolutionCurve
+    from enumsol.trusted.space.solution_curve import AlphaProblem, SolutionCurve
 
     Bounds = tuple[Fraction, Fraction]
 
@@ -76,44 +74,32 @@ class Curves:
 
     Parameters
     ----------
-    enclosure : CondensedEnclosure
+    given : AlphaProblem
     interval : (a, b), Fractions
-    chains : sequence of CurveChain
-        Those known from the beginning.
-    sampled : bool
-        Curves through any solutions were asked for.
-    final : bool
-        No further curve is to be followed.
-    tried : set of (low, high, codes)
-        Pieces of alpha and leaves at whose middle a curve was asked for; no codes where no status was known.
 
     Attributes
     ----------
     known : list of KnownCurve
     ends : list of (Fraction, Fraction)
         Ranges of alpha around the ends of curves, in their order.
-    interval, sampled, final, tried : as given
+    sampled : bool
+        Curves through any solutions were asked for.
+    final : bool
+        No further curve is to be followed.
+    tried : set of (low, high, codes)
+        Pieces of alpha and leaves at whose middle a curve was asked for; no codes where no status was known.
+    interval : as given
     """
 
-    def __init__(
-        self,
-        enclosure: CondensedEnclosure,
-        interval: Bounds,
-        chains: Iterable[CurveChain] = (),
-        *,
-        sampled: bool = False,
-        final: bool = False,
-        tried: Iterable[tuple[Fraction, Fraction, Codes]] = (),
-    ) -> None:
-        self._given, self.interval = AlphaProblem.of(enclosure), interval
-        self.sampled, self.final, self.tried = sampled, final, set(tried)
+    def __init__(self, given: AlphaProblem, interval: Bounds) -> None:
+        self._given, self.interval = given, interval
+        self.sampled = self.final = False
+        self.tried: set[tuple[Fraction, Fraction, Codes]] = set()
         self.known: list[KnownCurve] = []
         self.ends: list[Bounds] = []
         #: The curve of every box, numbered as in a proof.
         self._boxes: list[SolutionCurve] = []
         self._owner: list[int] = []
-        for chain in chains:
-            self.take(chain)
 
     # -- further curves --------------------------------------------------------------------------------------------
 

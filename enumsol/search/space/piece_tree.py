@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copy
 from dataclasses import dataclass, replace
 from fractions import Fraction
 from functools import lru_cache, partial
@@ -40,7 +41,6 @@ if TYPE_CHECKING:
     from enumsol.relaxation.space_relaxation import SpaceRelaxation
     from enumsol.search.parts import TreePart
     from enumsol.support.array_types import Codes, Floats
-    from enumsol.trusted.space.curve_runs import CurveChain
 
     #: The record of a node, and its children.
     Done = tuple[Record | "OpenLeaf", list["PieceNode"]]
@@ -119,10 +119,10 @@ class PieceTree:
     ----------
     enclosure : CondensedEnclosure
         The problem's own.
-    interval : (a, b), Fractions
     units : force and length, (p,) arrays of powers of two
     curves : Curves
-        Those that are known. Where the search would go on with another one it comes back, and says so in ``wanted``.
+        Those that are known over the interval. Where the search would go on with another one it comes back, and says so
+        in ``wanted``.
     max_nodes : int, optional
     tick : callable, optional
         Called with the share of the tree that is done, every child of a node being as large as the others.
@@ -148,14 +148,14 @@ class PieceTree:
     def __init__(
         self,
         enclosure: CondensedEnclosure,
-        interval: tuple[Fraction, Fraction],
         units: tuple[Floats, Floats],
         curves: Curves,
         max_nodes: int | None = None,
         tick: Callable[[float], object] | None = None,
         smallest: float = 2.0**-30,
     ) -> None:
-        self.interval, self.curves, self.units, self.smallest = interval, curves, units, smallest
+        interval = self.interval = curves.interval
+        self.curves, self.units, self.smallest = curves, units, smallest
         self.space = AlphaSpace(enclosure, sum(interval, Fraction(0)) / 2, units)
         self._most, self._tick = max_nodes, tick
         self._least = Fraction(smallest) * (interval[1] - interval[0])
@@ -451,32 +451,22 @@ class PieceWorker:
 
     Attributes
     ----------
-    enclosure, interval, units, smallest : as PieceTree takes them
-    chains, sampled, final, tried : as Curves takes them
+    enclosure, units, smallest : as PieceTree takes them
+    curves : Curves
+        The curves that are known, and for what further ones were asked.
     """
 
     enclosure: CondensedEnclosure
-    interval: tuple[Fraction, Fraction]
     units: tuple[Floats, Floats]
     smallest: float
-    chains: tuple[CurveChain, ...]
-    sampled: bool
-    final: bool
-    tried: frozenset[tuple[Fraction, Fraction, Codes]]
-
-    @classmethod
-    def of(cls, tree: PieceTree) -> PieceWorker:
-        """Worker for parts of a tree as it is now."""
-        curves = tree.curves
-        chains, tried = tuple(known.chain for known in curves.known), frozenset(curves.tried)
-        given = tree.space.enclosure, tree.interval, tree.units, tree.smallest
-        return cls(*given, chains, curves.sampled, curves.final, tried)
+    curves: Curves
 
     def examined(self, roots: Sequence[PieceNode], nodes: int) -> Answer:
         """Examine so many nodes, until the time is over or a curve is wanted."""
-        enclosure, interval = self.enclosure, self.interval
-        curves = Curves(enclosure, interval, self.chains, sampled=self.sampled, final=self.final, tried=self.tried)
-        tree = PieceTree(enclosure, interval, self.units, curves, smallest=self.smallest)
+        # as they were sent, whatever was asked for in an earlier task
+        curves = copy.copy(self.curves)
+        curves.tried = set(curves.tried)
+        tree = PieceTree(self.enclosure, self.units, curves, smallest=self.smallest)
         waiting = tree.examined(roots, nodes)
         rest = [item.sent() for item in waiting]
         return Answer(tree.records, tree.nodes, tree.covered, rest, tree.wanted is not None)
@@ -516,7 +506,8 @@ class SpreadPieces(Spread):
 
     def _worker(self) -> PieceWorker:
         self._sent = self._state
-        return PieceWorker.of(self._pieces)
+        tree = self._pieces
+        return PieceWorker(tree.space.enclosure, tree.units, tree.smallest, tree.curves)
 
     def _is_current(self, *, afresh: bool) -> bool:
         del afresh

@@ -86,6 +86,10 @@ class SpaceRoot:
     rigid: Ball | None = None
     drift: Drift | None = None
 
+    def away_from(self, centre: Floats, angle: Floats | float) -> Floats:
+        """Bounds of angles between its directions and those at an angle from other ones, (q,)."""
+        return np.asarray(np.abs(turned(centre, self.centre) + self.angle - angle) + self.angle_rad + ROUNDED_ANGLE)
+
 
 @dataclass(frozen=True)
 class LastBox:
@@ -276,8 +280,7 @@ def same_root(one: SpaceRoot, other: SpaceRoot) -> bool | None:
     """
     if _apart(one.y, other.y) or (one.rigid is not None and other.rigid is not None and _apart(one.rigid, other.rigid)):
         return False
-    away = np.abs(turned(other.centre, one.centre) + one.angle) + one.angle_rad + ROUNDED_ANGLE
-    return True if np.all(away < other.reach) else None
+    return True if np.all(one.away_from(other.centre, 0.0) < other.reach) else None
 
 
 def _apart(one: Ball, other: Ball) -> bool:

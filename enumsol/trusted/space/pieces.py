@@ -14,7 +14,6 @@ from enumsol.arithmetic.balls import SAFE, TINY, UNIT, Ball
 from enumsol.trusted.space.force_bound import is_unbalanced_in_space
 from enumsol.trusted.space.krawczyk import MARGIN
 from enumsol.trusted.space.leaf_equations import (
-    ROUNDED_ANGLE,
     Leaf,
     around_middle,
     by_parameter,
@@ -22,7 +21,6 @@ from enumsol.trusted.space.leaf_equations import (
     condition_rates,
     patterns,
     slacks,
-    turned,
     with_free_bounds,
 )
 from enumsol.trusted.space.leaves import Open, SpaceRoot, settle
@@ -298,11 +296,8 @@ class LeafArc:
 
     def has(self, root: SpaceRoot, codes: Codes) -> bool:
         """True if the root of a leaf, at an alpha of the piece, is on the arc."""
-        if patterns(codes) != self.statuses:
-            return False
-        shift = turned(self.centre, root.centre)
-        away = np.abs(shift + root.angle - self.angle) + root.angle_rad + ROUNDED_ANGLE
-        return bool(np.all(away <= self.radius))
+        same = patterns(codes) == self.statuses
+        return same and bool(np.all(root.away_from(self.centre, self.angle) <= self.radius))
 
 
 def arc_of(system: EnclosedSpace, codes: Sequence[int], found: SpaceRoot | Open, errors: float = 1.0) -> LeafArc | None:
