@@ -207,13 +207,15 @@ def lookahead_problems(smoke):
     if smoke:
         return
     yield Loaded("clip 8 x 1", 17, partial(gallery.clip, 8, 1), 3.0)
+    yield Loaded("clip 12 x 1", 25, partial(gallery.clip, 12, 1), 3.0)
     for nx in (12, 16):
         yield Loaded(f"brake shoe {nx} x 3", 2 * nx + 1, partial(gallery.brake_shoe, nx, 3), 0.4)
-    for p in (20, 32):
+    for p in (20, 32, 48, 64):
         yield oblique_wedge(p)
         yield straight_wedge(p)
     for ny in (16, 24, 32):
         yield Loaded(f"taper 4 x {ny}", 2 * ny, partial(gallery.taper, 4, ny), 0.2)
+    yield Loaded("dovetail", 14, gallery.dovetail, 0.5)
 
 
 def lookahead_row(loaded):
