@@ -1,6 +1,6 @@
 """Checker of the arcs of a branch graph: where every surviving selection holds, and how arcs are joined.
 
-Records are those of docs/proof_format.md, section 7.3.
+Records are those of docs/proof_format.md (7.3).
 
 Every box is expanded anew by the trusted core, and every part of it is tested (``arc_boxes``). Then events are paired
 by the condition that vanishes: each must have exactly one partner, arcs end at events, at the interval's ends or where

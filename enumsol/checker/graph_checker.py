@@ -1,6 +1,6 @@
 """Checker of a branch graph: every solution in the interval lies in one of the surviving selections, or on its arcs.
 
-Records are those of docs/proof_format.md, section 7. Pieces partition the interval (it is cut first where g vanishes,
+Records are those of docs/proof_format.md (7). Pieces partition the interval (it is cut first where g vanishes,
 see ``condensation.unloaded``). Over every piece the records are trees, of all selections or of the subtrees that the
 longer piece left to its halves; each exclusion is proven at both ends of the piece. Where surviving selections hold,
 and how their arcs are joined, is checked by ``enumsol.checker.arcs``, if the proof says it.

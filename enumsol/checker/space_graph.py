@@ -1,6 +1,6 @@
 """Checker of a branch graph in 3D: every solution over an interval lies on curves, each given by boxes.
 
-Records are those of docs/proof_format.md, section 8.
+Records are those of docs/proof_format.md (8).
 
 What is checked: every curve is one, from end to end; no two have a point in common; the leaves of the tree cover all
 solutions, and those of a leaf lie on one of the curves. An end inside the interval is a gap, as an open leaf is.

@@ -1,4 +1,4 @@
-"""Tangents, corrections, and transition points, which signs of test functions locate (theory, 8.3, (8.5), 8.7 and 8.8).
+"""Tangents, corrections, and transition points, which signs of test functions find (theory, sections 8.3, 8.7 and 8.8).
 
 Within one selection a solution curve is smooth, and the conditions of its statuses are smooth functions along it. The
 point at which the first of them vanishes is found by Newton's method, and checked: nothing else may have vanished

@@ -37,7 +37,7 @@ from enumsol.branches.space.make_curved import unordered
 from enumsol.branches.space.pieces import runs_and_turns
 from enumsol.continuation.path_data import PathStatus
 from enumsol.search.space.curve_proposals import border_of_zeta, curve_point, placed, unplaced
-from enumsol.support.deadlines import TimeOverError, within
+from enumsol.support.deadlines import Deadline, TimeOverError, within
 from enumsol.trusted.space.curve_parts import CurveMotion, Run, Turn, orders
 from enumsol.trusted.space.curve_runs import CurveChain
 from enumsol.trusted.space.sector_rows import OPEN, STICK
@@ -242,7 +242,7 @@ def test_an_interruption_of_continuation_interrupts_the_graph(monkeypatch):
 
 
 def test_the_time_may_be_over_during_continuation(monkeypatch):
-    deadline = SimpleNamespace(deadline=None)
+    deadline = Deadline()
 
     def end_time(*arguments):
         deadline.deadline = -1.0

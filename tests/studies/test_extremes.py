@@ -78,7 +78,7 @@ def test_friction_that_underflows_is_refused():
 def test_nothing_can_be_proven_about_a_body_on_the_verge(monkeypatch):
     # S definite only within rounding and too large for rationals: one undecided entry, and not 4^p of them
     monkeypatch.setattr(solvers, "EXACT_DOF_LIMIT", 0)
-    monkeypatch.setattr(enclosure, "dense_eigenvalue_bound", lambda S: 0.0)
+    monkeypatch.setattr(enclosure, "least_eigenvalue", lambda S: 0.0)
     problem = gallery.clamped_block(16, 8)
     found = enumerate_roots(problem, 1.0)
     monkeypatch.undo()
