@@ -11,13 +11,13 @@ from documents import ROOT
 
 #: A change that lowers a measure lowers its bound; one that has to raise it says why in its commit.
 BOUNDS = {
-    "code lines": 52_975,
-    "classes": 631,
-    "kinds of records": 20,
-    "parameters annotated Any": 115,
-    "files": 320,
-    "docstrings that begin with a pronoun": 26,
-    "class names used twice or more": 4,
+    "code lines": 51_695,
+    "classes": 607,
+    "kinds of records": 19,
+    "parameters annotated Any": 107,
+    "files": 271,
+    "docstrings that begin with a pronoun": 0,
+    "class names used twice or more": 0,
 }
 _NO_CODE = (tokenize.COMMENT, tokenize.NL, tokenize.NEWLINE, tokenize.INDENT, tokenize.DEDENT, tokenize.ENDMARKER)
 _PRONOUN = re.compile(r"(What|Of|The same|Where|Those|That|As|In which|How|Whether|One)\b")
