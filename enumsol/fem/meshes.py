@@ -15,8 +15,6 @@ from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
-from enumsol.decks.elements import shape_of
-from enumsol.decks.faces import uncollapsed
 from enumsol.errors import InvalidArgumentError
 from enumsol.model.cells import KINDS, boundary_facets, by_kind, facet_rows, node_counts, padded
 from enumsol.support.arguments import finite_number, one_of, positive_integer, positive_number, shown
@@ -598,6 +596,9 @@ def joined(points: Floats, blocks: Sequence[Integers], labels: Integers | None =
     InvalidArgumentError
         A cell names its last node twice and is no triangle, wedge or tetrahedron.
     """
+    from enumsol.decks.elements import shape_of  # not for bodies that are made, of one kind of cells
+    from enumsol.decks.faces import uncollapsed
+
     dimension = points.shape[1]
     rows, parts, first = [], [], 0
     for block in blocks:
