@@ -39,9 +39,9 @@ Form = tuple[list[Any], Any]
 
 def _outward(number: fmpq) -> tuple[float, float]:
     """The floats next below and above a rational; the same one twice if it is a float."""
-    exact = to_fraction(number)
-    near = float(exact)
-    if near == exact:
+    ratio = int(number.p), int(number.q)  # in lowest terms, as those of a float
+    near = ratio[0] / ratio[1]
+    if near.as_integer_ratio() == ratio:
         return near, near
     return math.nextafter(near, -math.inf), math.nextafter(near, math.inf)
 
@@ -344,7 +344,7 @@ class FiberSelections(ExactSelections):
 
 def as_float(value: fmpq | SupportsFloat) -> float:
     """The nearest float of a field element."""
-    return float(to_fraction(value)) if isinstance(value, fmpq) else float(value)
+    return int(value.p) / int(value.q) if isinstance(value, fmpq) else float(value)
 
 
 def row_reduce(table: list[list[Any]]) -> tuple[Any, list[int]]:
