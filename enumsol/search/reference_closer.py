@@ -8,11 +8,12 @@ such assignments first.
 from __future__ import annotations
 
 from functools import cached_property
-from typing import TYPE_CHECKING, Any, NamedTuple, Protocol, TypeVar
+from typing import TYPE_CHECKING, Any, Protocol, TypeVar
 
 import numpy as np
 
 from enumsol.model.statuses import BACKWARD, FORWARD, OPEN, SLIP_MINUS, SLIP_PLUS, STICK, UNDECIDED
+from enumsol.proof.leaves import OnlyReference
 from enumsol.search.nodes import TreeCloser
 from enumsol.support.deadlines import look
 from enumsol.trusted.at_alpha import solve_selection
@@ -39,24 +40,13 @@ _WORTH, _SAMPLE = 0.75, 24
 _NOTHING = 1e-9
 
 
-class OnlyRoot(NamedTuple):
-    """Why no other root lies below an assignment: rows that are equations, and products of rows.
-
-    ``turns``: in 3D theta with which no other root is left at all.
-    """
-
-    rows: list[Any]
-    products: list[tuple[Any, Any, float]]
-    turns: Floats | None = None
-
-
 class Referring(Protocol):
     """A certifier that can prove that a known root is the only one below an assignment."""
 
     def reference(self, selection: Codes) -> Any:
         """The form of a root, a Reference or LeafReference, if one is proven definite; or None."""
 
-    def only_root(self, codes: Codes, reference: Any, proposal: OnlyRoot) -> list[Any] | None:
+    def only_root(self, codes: Codes, reference: Any, proposal: OnlyReference) -> list[Any] | None:
         """The roots below an assignment, this one if it was not told before, or none; None if not proven."""
 
 
@@ -67,7 +57,7 @@ class ReferenceCloser(TreeCloser):
     ----------
     certifier : Referring
     root : callable giving the codes of a leaf with a strict root, or None
-    proposed : callable giving an OnlyRoot for a reference and an assignment
+    proposed : callable giving an OnlyReference for the form of a root and an assignment
     worth : callable
         Whether a reference is of any use.
     pause : callable
@@ -84,7 +74,7 @@ class ReferenceCloser(TreeCloser):
         self,
         certifier: Any,
         root: Callable[[], Codes | None],
-        proposed: Callable[[Any, Codes], OnlyRoot],
+        proposed: Callable[[Any, Codes], OnlyReference],
         *,
         worth: Callable[[Any], bool] = lambda _: True,
         pause: Callable[[int], int] = lambda vain: 2**vain - 1,
@@ -183,19 +173,19 @@ def reference_numbers(system: EnclosedSystem, selection: Codes) -> Iterator[tupl
         yield np.concatenate([np.full(p, mu), np.ones(len(share)), np.zeros(len(share)), share]), balance, mu
 
 
-def proposed(references: Sequence[PlaneReference], codes: Codes) -> OnlyRoot:
+def proposed(references: Sequence[PlaneReference], codes: Codes) -> OnlyReference:
     """All equations of an assignment, and if need be a product of opposite slips with the factor that is best.
 
-    For one root, or for those along a branch.
+    For one root, or for those along a branch, whose form was declared last.
     """
     rows, forward, backward = rows_of(references, codes)
     if not forward or not backward:
-        return OnlyRoot(rows, [])
+        return OnlyReference(1, rows, [])
     pairs = [(one, other) for one in {forward[0], forward[-1]} for other in {backward[0], backward[-1]}]
     middle = references[len(references) // 2]
     found = [_factor(middle, rows, one, other) for one, other in pairs]
     k = int(np.argmax([least for least, _ in found]))
-    return OnlyRoot(rows, [(*pairs[k], found[k][1])] if found[k][0] > 0 else [])
+    return OnlyReference(1, rows, [(*pairs[k], found[k][1])] if found[k][0] > 0 else [])
 
 
 def rows_of(references: Sequence[PlaneReference], codes: Codes) -> tuple[list[int], list[int], list[int]]:
@@ -269,7 +259,7 @@ class Cover:
         rest = tuple(self._back if i in self._first else UNDECIDED for i in range(system.p))
         return is_unbalanced(system, rest, motion_against(system, rest))
 
-    def _closed(self, codes: Codes) -> OnlyRoot | None:
+    def _closed(self, codes: Codes) -> OnlyReference | None:
         """Why no other root lies below an assignment; None where that is not proven."""
         with np.errstate(all="ignore"):
             proposal = proposed(self._references, codes)
@@ -279,7 +269,7 @@ class Cover:
 
     def leaves(
         self, excluded: Callable[[Codes], Why | None], searched: Callable[[Codes], list[tuple[Codes, Why]] | None]
-    ) -> list[tuple[Codes, OnlyRoot | Why]] | None:
+    ) -> list[tuple[Codes, OnlyReference | Why]] | None:
         """Assignments that cover all, with why no other root lies below each of them; None where that is not proven.
 
         ``excluded`` gives a reason why there is none below an assignment, or None; ``searched`` the leaves of a tree
@@ -288,7 +278,7 @@ class Cover:
         whole = (UNDECIDED,) * self._references[0].system.p
         if (alone := self._closed(whole)) is not None:
             return [(whole, alone)]
-        found: list[tuple[Codes, OnlyRoot | Why]] = []
+        found: list[tuple[Codes, OnlyReference | Why]] = []
         waiting = [whole] if self.pays else []
         while waiting:
             look()

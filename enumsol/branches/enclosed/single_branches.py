@@ -20,7 +20,7 @@ from enumsol.proof.leaves import Excluded, OnlyReference, Unbalanced
 from enumsol.search.chains import Chains, Link, LoadedSystem, SelectionCurve
 from enumsol.search.interval_tree import EmptyLeaf, Subtree
 from enumsol.search.reduction import WeightSource
-from enumsol.search.reference_closer import NUMBERS, Cover, OnlyRoot
+from enumsol.search.reference_closer import NUMBERS, Cover
 from enumsol.search.solvers import Solvers
 from enumsol.search.subintervals import ClosedPiece, IntervalWorker, Piece, Task, whole_pieces
 from enumsol.selections.float_selections import SIGN_TOLERANCE
@@ -151,10 +151,6 @@ def _was_tested(joined: Joined, proposed: _Proposed) -> bool:
     return True
 
 
-def _record(why: OnlyRoot | Record) -> Record:
-    return OnlyReference(1, why.rows, why.products) if isinstance(why, OnlyRoot) else why
-
-
 class _Proposals:
     """Proposals for one side of an alpha at which g vanishes, or for the whole interval.
 
@@ -245,9 +241,8 @@ class _Proposals:
             tried = ((one, branch_references(asked, one, _ERRORS)) for one in self._of_degree(degree))
             numbers, references = next(((one, found) for one, found in tried if found), (self._numbers[0], []))
             for reach in (free, system.reach) if references else ():
-                found = Cover(references, reach).leaves(unbalanced, partial(self._searched, piece))
-                if found is not None:
-                    leaves = [(codes, _record(why)) for codes, why in found]
+                leaves = Cover(references, reach).leaves(unbalanced, partial(self._searched, piece))
+                if leaves is not None:
                     bounded = reach is system.reach or self._need_bound(piece, leaves)
                     return _Proposed(piece, numbers, spans, leaves, bounded)
         return None

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from enumsol.proof.leaves import Excluded, NoRoot, OnlyReference, Unbalanced
+from enumsol.proof.leaves import Excluded, NoRoot, Unbalanced
 from enumsol.proof.proof_file import coarse
 from enumsol.proof.records import DeclaredForm
 from enumsol.search.certifiers.protocol import energy_margin
@@ -23,8 +23,8 @@ if TYPE_CHECKING:
     from collections.abc import Callable
 
     from enumsol.condensation.enclosure import EnclosedSystem
+    from enumsol.proof.leaves import OnlyReference
     from enumsol.search.certifiers.protocol import Bound, Margin
-    from enumsol.search.reference_closer import OnlyRoot
     from enumsol.support.array_types import Codes, Floats, Indices
 
     #: A record of a leaf without a root, and whether it needs the bound of the rigid displacement.
@@ -156,10 +156,10 @@ class Exclusions:
                     break
         return self._references[selection]
 
-    def only_root(self, codes: Codes, reference: Reference, proposal: OnlyRoot, *, within: bool) -> bool | None:
+    def only_root(self, codes: Codes, reference: Reference, proposal: OnlyReference, *, within: bool) -> bool | None:
         """True if the bound is needed for no other root to lie below an assignment; None if that is not proven."""
         for system in (self.free, self.system)[: 2 if within else 1]:
-            if OnlyReference(0, proposal.rows, proposal.products).holds(reference, codes, system.reach):
+            if proposal.holds(reference, codes, system.reach):
                 return system is self.system
         return None
 

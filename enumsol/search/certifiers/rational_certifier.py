@@ -22,9 +22,9 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Iterator, Mapping
 
     from enumsol.condensation.condensed import ScaledSystem
+    from enumsol.proof.leaves import OnlyReference
     from enumsol.search.certifiers.exclusions import Exclusions
     from enumsol.search.reduction import Point, Proposal
-    from enumsol.search.reference_closer import OnlyRoot
     from enumsol.selections.rational_selections import ExactSelections, Form
     from enumsol.support.array_types import Codes, Floats, Indices
     from enumsol.trusted.at_alpha import VerifiedSelection
@@ -100,7 +100,7 @@ class ExactCertifier(Certifier):
         """The form of a root of a body that nothing holds, if one is proven definite."""
         return None if self._exclusions is None else self._exclusions.reference(selection)
 
-    def only_root(self, codes: Codes, reference: Reference, proposal: OnlyRoot) -> list[SelectionSolution] | None:
+    def only_root(self, codes: Codes, reference: Reference, proposal: OnlyReference) -> list[SelectionSolution] | None:
         """The roots below an assignment, that of a form or none; None if that is not proven."""
         exclusions = self._exclusions
         needs = None if exclusions is None else exclusions.only_root(codes, reference, proposal, within=self.bounded)

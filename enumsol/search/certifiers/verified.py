@@ -34,7 +34,6 @@ if TYPE_CHECKING:
     from enumsol.search.certifiers.exclusions import Exclusions
     from enumsol.search.certifiers.rational_certifier import ExactCertifier
     from enumsol.search.reduction import LoneProposal, Point, Proposal
-    from enumsol.search.reference_closer import OnlyRoot
     from enumsol.support.array_types import Codes, Floats, Indices
     from enumsol.trusted.quadratic_forms import EnclosedForm
     from enumsol.trusted.reference import Reference
@@ -316,7 +315,9 @@ class VerifiedCertifier(protocol.Certifier):
         """The form of a root, if one is proven definite."""
         return None if self._exclusions is None else self._exclusions.reference(selection)
 
-    def only_root(self, codes: Codes, reference: Reference, proposal: OnlyRoot) -> list[SelectionSolution] | None:
+    def only_root(
+        self, codes: Codes, reference: Reference, proposal: leaves.OnlyReference
+    ) -> list[SelectionSolution] | None:
         """The roots below an assignment, that of a form or none; None if that is not proven."""
         exclusions = self._exclusions
         within = self.bounded or self._exact() is None
@@ -327,10 +328,10 @@ class VerifiedCertifier(protocol.Certifier):
         self._escalations.balls += 1
         selection = reference.selection
         back = self._back(selection, lambda: exclusions.declared[selection])
-        leaf = partial(leaves.OnlyReference, back, proposal.rows, proposal.products)
+        leaf = replace(proposal, back=back)
         if reference.lies_below(codes):
-            return [self._regular(selection, reference.root, leaf)]
-        self._leaf(leaf())
+            return [self._regular(selection, reference.root, lambda said: replace(leaf, enclosure=said))]
+        self._leaf(leaf)
         return []
 
     def _shared(self, codes: Codes, ball: VerifiedSelection | None) -> SelectionSolution | None:

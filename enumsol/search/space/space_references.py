@@ -13,7 +13,8 @@ from scipy.optimize import nnls
 
 from enumsol.model.sectors import SECTORS
 from enumsol.model.statuses import OPEN, SLIP_MINUS, SLIP_PLUS, STICK
-from enumsol.search.reference_closer import OnlyRoot, ReferenceCloser
+from enumsol.proof.leaves import OnlyReference
+from enumsol.search.reference_closer import ReferenceCloser
 from enumsol.search.space.space_fathoming import DefiniteForm
 from enumsol.trusted.space.sector_rows import ALONG, GAP, LEFT, RIGHT, SLIP
 
@@ -62,8 +63,8 @@ def space_closer(certifier: Any, engine: SpaceEngine, root: Callable[[], Codes |
 
     easy = 0 if engine.system.p >= _MANY else _EASY
 
-    def whole_or_below(found: LeafReference, codes: Codes) -> OnlyRoot:
-        return proposed(found, codes) if sole is None else OnlyRoot([], [], sole)
+    def whole_or_below(found: LeafReference, codes: Codes) -> OnlyReference:
+        return proposed(found, codes) if sole is None else OnlyReference(1, [], [], turns=sole)
 
     return ReferenceCloser(certifier, root, whole_or_below, worth=worth, pause=pause, easy=easy)
 
@@ -82,7 +83,7 @@ def _far_apart(reference: LeafReference) -> list[int]:
     return found
 
 
-def proposed(reference: LeafReference, codes: Codes) -> OnlyRoot:
+def proposed(reference: LeafReference, codes: Codes) -> OnlyReference:
     """All equations of an assignment, and products of rows of its sectors where they are needed."""
     kinds = [(GAP, 0), (SLIP, 0), (SLIP, 1)]
     has = reference.system.tau >= 0
@@ -97,15 +98,15 @@ def proposed(reference: LeafReference, codes: Codes) -> OnlyRoot:
     left = modes[:, sizes <= _NONE * np.max(np.abs(sizes), initial=0.0)]
     tight = _tight(reference, codes) if left.shape[1] else []
     if not tight:
-        return OnlyRoot(rows, [])
+        return OnlyReference(1, rows, [])
     coefficients = reference.rows(tight).mid
     coefficients = coefficients / np.linalg.norm(coefficients, axis=1, keepdims=True)
     factors = _balanced(coefficients @ reference.system.rows.G.mid.T @ left)
     if factors is None:
-        return OnlyRoot(rows, [])
+        return OnlyReference(1, rows, [])
     used = np.flatnonzero(factors > 0)
     chosen = [tight[k] for k in used]
-    return OnlyRoot(rows, _products(reference, rows, chosen, factors[used]))
+    return OnlyReference(1, rows, _products(reference, rows, chosen, factors[used]))
 
 
 def _tight(reference: LeafReference, codes: Codes) -> list[Row]:

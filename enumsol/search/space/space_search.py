@@ -58,7 +58,6 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Sequence
 
     from enumsol.model.problem3d import ContactProblem3D
-    from enumsol.search.reference_closer import OnlyRoot
     from enumsol.support.array_types import Alpha, Codes, Floats
     from enumsol.trusted.space.boxed_solution import BoxedSolution
     from enumsol.trusted.space.pieces import AlphaPiece
@@ -378,12 +377,11 @@ class SpaceCertifier(Certifier):
         """The form of the root of a leaf, if one is proven definite."""
         return self._exclusions.reference(self._engine.system, leaf)
 
-    def only_root(self, codes: Codes, reference: LeafReference, proposal: OnlyRoot) -> list[SpaceRoot] | None:
+    def only_root(self, codes: Codes, reference: LeafReference, proposal: OnlyReference) -> list[SpaceRoot] | None:
         """The root, as a list, unless it was declared before; None if it is not proven that no other one lies below."""
         exclusions, leaf, found = self._exclusions, reference.selection, list[SpaceRoot]()
-        record = OnlyReference(0, proposal.rows, proposal.products, turns=proposal.turns)
-        if not record.holds(reference, codes, exclusions.free.reach):
-            if not record.holds(reference, codes, exclusions.system.reach):
+        if not proposal.holds(reference, codes, exclusions.free.reach):
+            if not proposal.holds(reference, codes, exclusions.system.reach):
                 return None
             self.bounded = True
         if leaf not in self._declared:
@@ -391,7 +389,7 @@ class SpaceCertifier(Certifier):
             found = [self._placed(leaf, reference.root)]
             self._verified[leaf] = found[0]
         declared = DeclaredForm(leaf, *exclusions.numbers[leaf], self._ball(reference.root))
-        self._leaf(replace(record, back=self._back(leaf, lambda: declared)))
+        self._leaf(replace(proposal, back=self._back(leaf, lambda: declared)))
         return found
 
     def _ball(self, found: SpaceRoot | LooseSolution, wider: float = WIDEN) -> EnclosureRecord:
