@@ -22,13 +22,13 @@ from enumsol.model.statuses import (
     UNDECIDED,
 )
 from enumsol.search.nodes import TreeCloser
-from enumsol.search.reduction import NEAR, KnownRoot, Lone, LoneProposal, Proposal, Reduction, WeightSource
+from enumsol.search.reduction import NEAR, KnownRoot, Lone, Proposal, Reduction, WeightSource
 from enumsol.selections.solution import ActiveSets, SelectionSolution
 
 if TYPE_CHECKING:
     from enumsol.condensation.condensed import ScaledSystem
     from enumsol.relaxation.engine import Relaxation
-    from enumsol.search.certifiers.protocol import Bound, Certifier
+    from enumsol.search.certifiers.protocol import Certifier
     from enumsol.search.reduction import Point
     from enumsol.support.array_types import Codes, Floats
 
@@ -176,17 +176,13 @@ class Closer(TreeCloser):
         self._told, self._bound = told + max(1, p // 4), 0.5 * relaxation.bound
         return self._alone(codes, known, relaxation if relaxation.form is None else self.relaxed(codes))
 
-    def alone(self, codes: Codes, proposal: LoneProposal, bound: Bound) -> list[SelectionSolution] | None:
-        """The root of what an earlier search proposed, if it is proven to be the only one; None if not."""
-        return self._certifier.alone(codes, proposal, bound) if self._certifier.lone else None
-
     def _alone(
         self, codes: Codes, known: KnownRoot, relaxation: Relaxation | None, *, descent: bool = False
     ) -> list[SelectionSolution] | None:
         if relaxation is None:
             return None
         proposal = Lone(self._system, codes, known, relaxation).proposal(descent=descent)
-        return None if proposal is None else self._certifier.alone(codes, proposal, relaxation)
+        return None if proposal is None else self._certifier.alone(codes, proposal)
 
 
 def _touches(codes: Codes, relaxation: Relaxation | None) -> bool:

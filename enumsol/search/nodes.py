@@ -27,8 +27,7 @@ if TYPE_CHECKING:
     from enumsol.condensation.condensed import ScaledSystem
     from enumsol.relaxation.active_set import IntervalSystem
     from enumsol.relaxation.engine import Engine, Relaxation
-    from enumsol.search.certifiers.protocol import Bound, Led
-    from enumsol.search.reduction import LoneProposal
+    from enumsol.search.certifiers.protocol import Led
     from enumsol.support.array_types import Codes, Floats
     from enumsol.trusted.quadratic_forms import EnclosedForm, QuadraticForm
 
@@ -182,11 +181,6 @@ class TreeCloser:
     def again(self, codes: Codes, relaxation: Relaxation | None) -> list[Any] | None:
         """The solutions of a subtree that was closed in an earlier search."""
         return self.closed(codes, relaxation)
-
-    def alone(self, codes: Codes, proposal: LoneProposal, bound: Bound) -> list[Any] | None:
-        """The root of what an earlier search proposed, if it is proven to be the only one; None if not."""
-        del codes, proposal, bound
-        return None
 
     def met(self, answer: object) -> None:
         """Take note of what a complete selection holds."""

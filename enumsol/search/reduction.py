@@ -15,8 +15,11 @@ import numpy as np
 
 from enumsol.arithmetic.balls import factor_above
 from enumsol.model.statuses import CONTACT, FRICTIONLESS, OPEN, SLIP_MINUS, SLIP_PLUS, STICK
+from enumsol.proof.leaves import Alone
+from enumsol.proof.records import NOWHERE
 from enumsol.search.definite import DEFINITE, AnalyticCentres, Descent, Nodes
 from enumsol.support.deadlines import look
+from enumsol.trusted.exclusion import Terms
 from enumsol.trusted.selection import Selection, Unknowns
 from enumsol.trusted.status_rows import refines, slip_directions
 from enumsol.trusted.uniqueness import numbers_of
@@ -311,15 +314,6 @@ class KnownRoot:
         return all(refines(mine, code) for mine, code in zip(self.selection, codes, strict=True))
 
 
-@dataclass(frozen=True)
-class LoneProposal:
-    """The selection of a known root, and the numbers and strengths that may prove it alone."""
-
-    selection: Codes
-    weights: Floats
-    strengths: Floats
-
-
 class Lone:
     """The form of theory, (6.13), below an assignment at a known root, in floats.
 
@@ -334,7 +328,7 @@ class Lone:
 
     def __init__(self, system: ScaledSystem, codes: Codes, known: KnownRoot, relaxation: Relaxation) -> None:
         F, status = system.F, np.array(codes)
-        self._system, self._known = system, known
+        self._system, self._known, self._relaxation = system, known, relaxation
         nodes, own = numbers_of(codes, (F > 0).tolist())
         self._nodes = nodes
         at = Unknowns(system.p, nodes, own, slip_directions(codes)[nodes])
@@ -343,7 +337,7 @@ class Lone:
         self.touching = np.isin(status[nodes], _TOUCHING)
         self.stuck = status[nodes[own]] == STICK
         self.nodes = self._at_root(nodes, at.normal)
-        self.spare = self._spare(relaxation)
+        self.spare = self._spare()
 
     def _at_root(self, nodes: Indices, normal: Indices) -> Nodes:
         known, chosen = self._known, nodes[normal]
@@ -356,9 +350,10 @@ class Lone:
         wide = np.zeros(len(normal), dtype=bool)
         return Nodes(len(nodes), normal, tangential, F, share, wide, np.where(codes == OPEN, -w_n, 0.0), slip)
 
-    def _spare(self, relaxation: Relaxation) -> Floats:
+    def _spare(self) -> Floats:
         """Strengths of squares that mu and nu of each node allow at most; zero where they need not allow any."""
         nodes, p, system, spare = self._nodes, self._system.p, self._system, np.zeros((2, len(self._nodes)))
+        relaxation = self._relaxation
         if relaxation.form is not None:
             return spare
         reach = np.sqrt(max(-relaxation.bound, 0.0) + _WIDER)
@@ -393,8 +388,8 @@ class Lone:
         except np.linalg.LinAlgError:
             return None
 
-    def proposal(self, *, descent: bool = False) -> LoneProposal | None:
-        """Proposal that may be proven, or None."""
+    def proposal(self, *, descent: bool = False) -> Alone | None:
+        """The record that may hold, without an enclosure and with all multipliers of the relaxation; or None."""
         numbers = self.numbers(descent=descent)
         if numbers is None:
             return None
@@ -404,4 +399,5 @@ class Lone:
         strengths = np.zeros((2, p))
         strengths[0, self._nodes] = np.where(self.touching, _STIFF, mu * self.spare[0] + nu * self.spare[1])
         strengths[1, self._nodes[self.nodes.normal[self.stuck]]] = _STIFF
-        return LoneProposal(self._known.selection, numbers[: count + 3 * b], strengths)
+        terms = Terms(*self._relaxation.multipliers())
+        return Alone(self._known.selection, numbers[: count + 3 * b], NOWHERE, strengths, terms)

@@ -8,7 +8,7 @@ such assignments first.
 from __future__ import annotations
 
 from functools import cached_property
-from typing import TYPE_CHECKING, Any, Protocol, TypeVar
+from typing import TYPE_CHECKING, Any, TypeVar
 
 import numpy as np
 
@@ -26,7 +26,7 @@ if TYPE_CHECKING:
 
     from enumsol.condensation.enclosure import EnclosedSystem
     from enumsol.relaxation.engine import Relaxation
-    from enumsol.search.certifiers.protocol import Led
+    from enumsol.search.certifiers.protocol import Certifier, Led
     from enumsol.support.array_types import Codes, Floats
     from enumsol.trusted.reference import PlaneReference
 
@@ -40,24 +40,16 @@ _WORTH, _SAMPLE = 0.75, 24
 _NOTHING = 1e-9
 
 
-class Referring(Protocol):
-    """A certifier that can prove that a known root is the only one below an assignment."""
-
-    def reference(self, selection: Codes) -> Any:
-        """The form of a root, a Reference or LeafReference, if one is proven definite; or None."""
-
-    def only_root(self, codes: Codes, reference: Any, proposal: OnlyReference) -> list[Any] | None:
-        """The roots below an assignment, this one if it was not told before, or none; None if not proven."""
-
-
 class ReferenceCloser(TreeCloser):
-    """Ends the tree where only a known root is left, in 2D and 3D.
+    """Ends the tree where only a known root is left, in 2D and 3D, and leads it there if it has a cover that pays.
 
     Parameters
     ----------
-    certifier : Referring
+    certifier : Certifier
     root : callable giving the codes of a leaf with a strict root, or None
     proposed : callable giving an OnlyReference for the form of a root and an assignment
+    cover : callable, optional
+        Gives the Cover of a reference, by which the tree may be led.
     worth : callable
         Whether a reference is of any use.
     pause : callable
@@ -72,18 +64,18 @@ class ReferenceCloser(TreeCloser):
 
     def __init__(
         self,
-        certifier: Any,
+        certifier: Certifier,
         root: Callable[[], Codes | None],
         proposed: Callable[[Any, Codes], OnlyReference],
         *,
+        cover: Callable[[Any], Cover] | None = None,
         worth: Callable[[Any], bool] = lambda _: True,
         pause: Callable[[int], int] = lambda vain: 2**vain - 1,
         easy: int = 0,
     ) -> None:
         super().__init__()
-        self._certifier: Referring = certifier
-        self._root, self._proposed, self._worth, self._pause = root, proposed, worth, pause
-        self._easy, self._wait, self._vain = easy, 0, 0
+        self._certifier, self._root, self._proposed, self._worth, self._pause = certifier, root, proposed, worth, pause
+        self._covered, self._easy, self._wait, self._vain = cover, easy, 0, 0
 
     @cached_property
     def _reference(self) -> Any:
@@ -91,6 +83,26 @@ class ReferenceCloser(TreeCloser):
             self.known = self._root() or ()
         found = self._certifier.reference(self.known) if self.known else None
         return found if found is not None and self._worth(found) else None
+
+    @cached_property
+    def _cover(self) -> Cover | None:
+        """Leads the tree where that pays."""
+        if self._covered is None or self._reference is None:
+            return None
+        cover = self._covered(self._reference)
+        return cover if cover.is_whole and cover.pays else None
+
+    @property
+    def leads(self) -> bool:
+        """True if the tree is led."""
+        return self._cover is not None
+
+    def led(self, codes: Codes) -> Led | None:
+        """The roots below an assignment if certificates decide it, or else the node to split and how; or None."""
+        if self._cover is None:
+            return None
+        found = self.again(codes, None) if self._cover.is_due(codes) else None
+        return self._cover.split(codes) if found is None else found
 
     def whole(self) -> list[Any] | None:
         """All solutions of the problem, if one certificate proves that there is one only."""
@@ -100,6 +112,8 @@ class ReferenceCloser(TreeCloser):
 
     def closed(self, codes: Codes, relaxation: Relaxation | None) -> list[Any] | None:
         """The solutions of a subtree that can be closed, None where it has to be searched."""
+        if self._cover is not None and self._cover.is_due(codes):
+            return None  # it was tried before it was split
         if self._easy or self._wait:
             self._easy, self._wait = max(self._easy - 1, 0), max(self._wait - 1, 0)
             return None
@@ -116,37 +130,6 @@ class ReferenceCloser(TreeCloser):
         with np.errstate(all="ignore"):
             proposal = self._proposed(self._reference, codes)
         return self._certifier.only_root(codes, self._reference, proposal)
-
-
-class LeadingCloser(ReferenceCloser):
-    """Ends the tree in 2D where only a known root is left, and leads it there."""
-
-    def __init__(self, certifier: Any, root: Callable[[], Codes | None]) -> None:
-        super().__init__(certifier, root, lambda reference, codes: proposed([reference], codes))
-
-    @cached_property
-    def _cover(self) -> Cover | None:
-        """Leads the tree where that pays."""
-        cover = None if self._reference is None else Cover([self._reference])
-        return cover if cover is not None and cover.is_whole and cover.pays else None
-
-    @property
-    def leads(self) -> bool:
-        """True if the tree is led."""
-        return self._cover is not None
-
-    def led(self, codes: Codes) -> Led | None:
-        """The roots below an assignment if certificates decide it, or else the node to split and how; or None."""
-        if self._cover is None:
-            return None
-        found = self.again(codes, None) if self._cover.is_due(codes) else None
-        return self._cover.split(codes) if found is None else found
-
-    def closed(self, codes: Codes, relaxation: Relaxation | None) -> list[Any] | None:
-        """The solutions of a subtree that can be closed, None where it has to be searched."""
-        if self._reference is None or (self._cover is not None and self._cover.is_due(codes)):
-            return None
-        return super().closed(codes, relaxation)
 
 
 #: mu of all nodes where kappa is one, and factors of |G d|^2, that are tried.

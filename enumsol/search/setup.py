@@ -23,7 +23,6 @@ from enumsol.proof.writer import KeptRecords, point_header, unit_exponents
 from enumsol.search.certifiers.protocol import NO_BOUND, RecordedBound, Refine, UndecidedPart, Unrecorded
 from enumsol.search.nodes import Relaxations, TreeNode
 from enumsol.search.parts import Answer, Spread, TreePart
-from enumsol.search.reduction import LoneProposal
 from enumsol.search.tree import REPORT_EVERY, TreeSearch
 from enumsol.support.deadlines import within
 
@@ -535,9 +534,8 @@ class Replay:
                 return search.excluded(item, NO_BOUND)
             if isinstance(leaf, leaves.Excluded):
                 return search.excluded(item, self._bound(leaf))
-            if isinstance(leaf, leaves.Alone) and leaf.strengths is not None and leaf.terms is not None:
-                proposal = LoneProposal(leaf.selection, leaf.numbers, leaf.strengths)
-                return search.alone(item, proposal, RecordedBound(*leaf.terms))
+            if isinstance(leaf, leaves.Alone) and leaf.strengths is not None:
+                return search.alone(item, leaf)
         except ValueError:
             return False
         if isinstance(leaf, leaves.OnlyReference):

@@ -26,7 +26,7 @@ from enumsol.search.certifiers.verified import VerifiedCertifier
 from enumsol.search.fathoming import Closer, holds_below, propose, without_load
 from enumsol.search.nodes import Forms, Relaxations, TreeCloser, plane_forms
 from enumsol.search.reduction import NEAR, WeightSource
-from enumsol.search.reference_closer import LeadingCloser
+from enumsol.search.reference_closer import Cover, ReferenceCloser, proposed
 from enumsol.search.setup import WEAK, SearchSetup, weakly_held
 from enumsol.search.splitting import PlaneSplitting
 from enumsol.search.tree import TreeSearch
@@ -291,7 +291,12 @@ class Solvers(SearchSetup):
     def _closer(self, certifier: Certifier) -> TreeCloser | None:
         if self.problem.held:
             return Closer(self.scaled, certifier)
-        return LeadingCloser(certifier, lambda: self.known_root)
+        return ReferenceCloser(
+            certifier,
+            lambda: self.known_root,
+            lambda reference, codes: proposed([reference], codes),
+            cover=lambda reference: Cover([reference]),
+        )
 
     @cached_property
     def _forms(self) -> Forms | None:

@@ -28,10 +28,10 @@ from enumsol.support.deadlines import Deadline, TimeOverError, over, tell, withi
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
 
+    from enumsol.proof.leaves import Alone
     from enumsol.relaxation.engine import Relaxation
     from enumsol.search.nodes import Forms
     from enumsol.search.parts import Answer
-    from enumsol.search.reduction import LoneProposal
     from enumsol.support.array_types import Codes
 
 
@@ -417,9 +417,9 @@ class TreeSearch:
         """True if the subtree is closed by its only possible solution; ``again``: it was, in an earlier search."""
         return self._close(item, (self.closer.again if again else self.closer.closed)(item.codes, relaxation))
 
-    def alone(self, item: TreeNode, proposal: LoneProposal, bound: Bound) -> bool:
+    def alone(self, item: TreeNode, record: Alone) -> bool:
         """True if the subtree is closed by a root that is proven to be the only one."""
-        return self._close(item, self.closer.alone(item.codes, proposal, bound))
+        return self._close(item, self.certifier.alone(item.codes, record))
 
     def _close(self, item: TreeNode, found: list[Any] | None) -> bool:
         if found is None:

@@ -73,7 +73,7 @@ def row(name: str, most: int) -> dict[str, Any]:
     search = partial(enumsol.enumerate_roots, problem, 0, max_nodes=most)
     roots, seconds = timed(search)
     checked, verified = timed(enumsol.verify, problem, roots.proof)
-    with patch("enumsol.search.solvers.LeadingCloser", lambda *_: TreeCloser()):
+    with patch("enumsol.search.solvers.ReferenceCloser", lambda *_, **__: TreeCloser()):
         alone, without = timed(search)
     assert checked
     assert enumsol.verify(problem, alone.proof)

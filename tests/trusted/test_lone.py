@@ -55,7 +55,7 @@ class Case:
             return None
         known = KnownRoot(root[0], root[1].force.mid, root[1].w.mid)
         proposal = Proposed(self.scaled, codes, known, relaxation).proposal()
-        return None if proposal is None else [proposal.weights, proposal.strengths, *relaxation.multipliers()]
+        return None if proposal is None else [proposal.numbers, proposal.strengths, *proposal.terms]
 
     def terms(self, rows, values):
         """Rows with multipliers in units, in rationals."""

@@ -22,9 +22,10 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Mapping, Sequence
 
     from enumsol.condensation.enclosure import EnclosedSystem
+    from enumsol.proof.leaves import Alone, OnlyReference
     from enumsol.proof.records import DeclaredForm
     from enumsol.proof.writer import Part, Recorder
-    from enumsol.search.reduction import LoneProposal, Point, Proposal
+    from enumsol.search.reduction import Point, Proposal
     from enumsol.selections.solution import SelectionSolution, SelectionSolver
     from enumsol.support.array_types import Codes, Floats, Indices
     from enumsol.trusted.quadratic_forms import EnclosedForm
@@ -216,9 +217,22 @@ class Certifier(ABC):
         del codes, proposal, near
         return None
 
-    def alone(self, codes: Codes, proposal: LoneProposal, bound: Bound) -> list[Any] | None:
-        """The root of what is proposed, if it is proven to be the only one below a partial assignment; else None."""
-        del codes, proposal, bound
+    def alone(self, codes: Codes, record: Alone) -> list[Any] | None:
+        """The root of a record, if it is proven to be the only one below a partial assignment; else None."""
+        del codes, record
+        return None
+
+    def reference(self, selection: Codes) -> Any:
+        """The form of a root of a body that nothing holds, a Reference or LeafReference, if one is definite; or None.
+
+        In 2D the root of a selection, in 3D that of a leaf.
+        """
+        del selection
+        return None
+
+    def only_root(self, codes: Codes, reference: Any, proposal: OnlyReference) -> list[Any] | None:
+        """The roots below an assignment, that of a form if it was not told before, or none; None if not proven."""
+        del codes, reference, proposal
         return None
 
     # -- the proof -------------------------------------------------------------------------------------------------

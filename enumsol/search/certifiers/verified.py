@@ -33,7 +33,7 @@ if TYPE_CHECKING:
     from enumsol.proof.writer import Recorder
     from enumsol.search.certifiers.exclusions import Exclusions
     from enumsol.search.certifiers.rational_certifier import ExactCertifier
-    from enumsol.search.reduction import LoneProposal, Point, Proposal
+    from enumsol.search.reduction import Point, Proposal
     from enumsol.support.array_types import Codes, Floats, Indices
     from enumsol.trusted.quadratic_forms import EnclosedForm
     from enumsol.trusted.reference import Reference
@@ -215,12 +215,11 @@ class VerifiedCertifier(protocol.Certifier):
                 return [exactly]
         return found
 
-    def alone(self, codes: Codes, proposal: LoneProposal, bound: protocol.Bound) -> list[SelectionSolution] | None:
-        """The root of what is proposed, if it is proven to be the only one below a partial assignment; else None."""
-        if self._enclosed is None:
+    def alone(self, codes: Codes, record: leaves.Alone) -> list[SelectionSolution] | None:
+        """The root of a record, if it is proven to be the only one below a partial assignment; else None."""
+        if self._enclosed is None or record.terms is None:
             return None
-        more = proposal.strengths, self._allowed(codes, *bound.multipliers())
-        leaf = leaves.Alone(proposal.selection, proposal.weights, records.NOWHERE, *more)
+        leaf = replace(record, terms=self._allowed(codes, *record.terms))
         root = leaf.holds(self._enclosed, codes)
         if root is None:
             return None

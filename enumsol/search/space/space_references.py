@@ -6,7 +6,7 @@ Nothing here is trusted: the certifier proves what is proposed, or the tree is s
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 from scipy.optimize import nnls
@@ -23,6 +23,7 @@ if TYPE_CHECKING:
 
     from enumsol.condensation.space_condensed import EnclosedSpace, SpaceSystem
     from enumsol.relaxation.space_relaxation import SpaceEngine
+    from enumsol.search.certifiers.protocol import Certifier
     from enumsol.support.array_types import Codes, Floats, Indices
     from enumsol.trusted.space.leaves import SpaceRoot
     from enumsol.trusted.space.sector_rows import Row
@@ -36,12 +37,12 @@ _FACTORS = np.geomspace(2.0**-8, 2.0**8, 9)
 _MANY, _EASY = 8, 32
 
 
-def space_closer(certifier: Any, engine: SpaceEngine, root: Callable[[], Codes | None]) -> ReferenceCloser:
+def space_closer(certifier: Certifier, engine: SpaceEngine, root: Callable[[], Codes | None]) -> ReferenceCloser:
     """A closer that ends the tree where only a root is left; none if not even its own statuses leave it alone.
 
     Parameters
     ----------
-    certifier : Referring
+    certifier : Certifier
     engine : SpaceEngine
         Of the relaxations, which decides first whether some nodes are open.
     root : callable giving the codes of a leaf with a strict root, or None
