@@ -6,7 +6,9 @@ Displacements, loads and temperatures of a step stay in later ones (OP=MOD) unle
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+from itertools import accumulate
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -27,26 +29,111 @@ _ROUNDED = 1e-3
 _OTHER_FIELDS = {"GRAV": "gravity in another direction", "CENTRIF": "CENTRIF about another axis"}
 
 
-@dataclass
+@dataclass(frozen=True, eq=False)
 class DeckState:
-    """State at the end of a step: what is given then.
+    """State at the end of a step, or before the first one: what is given then.
 
     Attributes
     ----------
-    values : dict of Key to float
-        Displacements ("BOUNDARY", node, component), forces ("CLOAD", node, component), loads on elements ("DLOAD",
-        element, label), fields ("GRAV", set, direction) or ("CENTRIF", set, axis), and temperatures ("TEMPERATURE",
-        node, 0).
-    places : dict of Key to DeckPlace
-        The line that gave each.
+    deck : Deck
+    period, time : float
+        Of the step, and from the beginning of the first one to its end.
+    terms : dict of Key to list of (float, Act)
+        Reference values of everything that is given, each with the line that gave it.
     """
 
-    values: dict[Key, float] = field(default_factory=dict)
-    places: dict[Key, DeckPlace] = field(default_factory=dict)
+    deck: Deck
+    period: float = 0.0
+    time: float = 0.0
+    terms: dict[Key, list[tuple[float, Act]]] = field(default_factory=dict)
+
+    @cached_property
+    def values(self) -> dict[Key, float]:
+        """Values of everything that is given.
+
+        Displacements ("BOUNDARY", node, component), forces ("CLOAD", node, component), loads on elements ("DLOAD",
+        element, label), fields ("GRAV", set, direction) or ("CENTRIF", set, axis), and temperatures ("TEMPERATURE",
+        node, 0) or ("INITIAL CONDITIONS", node, 0).
+        """
+        return {key: sum(self._value(*term) for term in terms) for key, terms in self.terms.items()}
 
     def of(self, kind: str) -> dict[tuple[int | str, int | str], float]:
         """The values of one kind, by node or element and what is given to it."""
         return {(of, what): value for (own, of, what), value in self.values.items() if own == kind}
+
+    def place(self, key: Key) -> DeckPlace:
+        """The line that gave a value."""
+        return self.terms[key][0][1].place
+
+    def after(self, step: DeckStep) -> DeckState:
+        """State at the end of the step that follows.
+
+        Raises
+        ------
+        InvalidArgumentError
+            A line contradicts another one of the step, or names what is not in the deck.
+        """
+        made = DeckState(self.deck, step.period, self.time + step.period, self._lasting(step))
+        given: set[Key] = set()
+        for act in step.acts:
+            if act.amplitude is not None:
+                said = f"*{act.card} names the amplitude {act.amplitude}"
+                act.place.entry(self.deck.amplitudes, act.amplitude, said)
+            for key, reference in _given_to(self.deck, act):
+                made._give(key, reference, act, given)
+        return made
+
+    def _lasting(self, step: DeckStep) -> dict[Key, list[tuple[float, Act]]]:
+        """Terms that a step leaves: with their last values, but for amplitudes over the time of all steps."""
+        loads, kept = {"DLOAD", "DSLOAD"}, {}
+        for key, terms in self.terms.items():
+            card = terms[0][1].card
+            if card in step.fresh:
+                continue
+            if card in loads and step.fresh & loads:
+                raise step.place.refused(
+                    f"*{min(step.fresh & loads)} with OP=NEW follows loads by *{card}, which programs keep or take "
+                    "away; expected OP=NEW of both cards, or of none"
+                )
+            kept[key] = [
+                (reference, act)
+                if act.amplitude is not None and self.deck.amplitudes[act.amplitude].total
+                else (self._value(reference, act), replace(act, amplitude=None))
+                for reference, act in terms
+            ]
+        return kept
+
+    def _give(self, key: Key, reference: float, act: Act, given: set[Key]) -> None:
+        if key in given and key[0] == "CLOAD":
+            self.terms[key].append((reference, act))
+            return
+        if key in given and key[0] in ("BOUNDARY", "DLOAD", *FIELDS):
+            ((before, other),) = self.terms[key]
+            if (before, other.amplitude) != (reference, act.amplitude):
+                raise act.place.refused(
+                    f"*{act.card} gives {self._named(key)} the value {reference:g}, and {other.place} gives it "
+                    f"{before:g} in the same step; expected one value"
+                )
+        others = (own for own in self.terms if own[:2] == key[:2] and own != key and own not in given)
+        if key[0] in FIELDS and (earlier := next(others, None)) is not None:
+            raise act.place.refused(
+                f"*DLOAD gives {key[1]} {_OTHER_FIELDS[key[0]]} than {self.place(earlier)}, to which programs add it "
+                "or not; expected OP=NEW"
+            )
+        self.terms[key] = [(reference, act)]
+        given.add(key)
+
+    def _value(self, reference: float, act: Act) -> float:
+        if act.amplitude is None:
+            return reference
+        amplitude = self.deck.amplitudes[act.amplitude]
+        return reference * amplitude.at(self.time if amplitude.total else self.period)
+
+    def _named(self, key: Key) -> str:
+        kind, of, what = key
+        if kind in ("BOUNDARY", "CLOAD"):
+            return f"component {what} of node {self.deck.node_name(int(of))}"
+        return f"{kind} of {of}" if kind in FIELDS else f"{what} of element {self.deck.element_name(int(of))}"
 
 
 def states_of(deck: Deck) -> list[DeckState]:
@@ -55,92 +142,10 @@ def states_of(deck: Deck) -> list[DeckState]:
     Raises
     ------
     InvalidArgumentError
-        A line contradicts another one of its step, or names what is not in the deck.
+        As `DeckState.after`.
     """
-    acting, time = _Acting(deck), 0.0
-    acting.take(deck.initial, time)
-    states = []
-    for step in deck.steps:
-        time += step.period
-        acting.take(step, time)
-        states.append(acting.state())
-    return states
-
-
-class _Acting:
-    """Terms (reference value, amplitude) of every key, step by step."""
-
-    def __init__(self, deck: Deck) -> None:
-        self._deck, self._amplitudes = deck, deck.amplitudes
-        self._terms: dict[Key, list[tuple[float, str | None]]] = {}
-        self._places: dict[Key, DeckPlace] = {}
-        self._cards: dict[Key, str] = {}
-        self._period, self._time = 0.0, 0.0
-
-    def take(self, step: DeckStep, time: float) -> None:
-        """Put the cards of a step into effect, which ends at this time."""
-        # what has ended keeps its last value, but for amplitudes over the time of all steps
-        for key, terms in self._terms.items():
-            self._terms[key] = [term if self._lasts(term[1]) else (self._value(term), None) for term in terms]
-        self._period, self._time = step.period, time
-        self._begin_anew(step)
-        given: dict[Key, DeckPlace] = {}
-        for act in step.acts:
-            if act.amplitude is not None:
-                said = f"*{act.card} names the amplitude {act.amplitude}"
-                act.place.entry(self._amplitudes, act.amplitude, said)
-            for key, reference in _given_to(self._deck, act):
-                self._give(key, (reference, act.amplitude), act, given)
-
-    def _begin_anew(self, step: DeckStep) -> None:
-        """Take away what cards with OP=NEW replace."""
-        loads = {"DLOAD", "DSLOAD"}
-        for key, card in list(self._cards.items()):
-            if card in step.fresh:
-                del self._terms[key], self._places[key], self._cards[key]
-            elif card in loads and step.fresh & loads:
-                raise step.place.refused(
-                    f"*{min(step.fresh & loads)} with OP=NEW follows loads by *{card}, which programs keep or take "
-                    "away; expected OP=NEW of both cards, or of none"
-                )
-
-    def _give(self, key: Key, term: tuple[float, str | None], act: Act, given: dict[Key, DeckPlace]) -> None:
-        if key in given and key[0] == "CLOAD":
-            self._terms[key].append(term)
-            return
-        if key in given and key[0] in ("BOUNDARY", "DLOAD", *FIELDS) and self._terms[key] != [term]:
-            raise act.place.refused(
-                f"*{act.card} gives {self._named(key)} the value {term[0]:g}, and {given[key]} gives it "
-                f"{self._terms[key][0][0]:g} in the same step; expected one value"
-            )
-        others = (own for own in self._terms if own[:2] == key[:2] and own != key and own not in given)
-        if key[0] in FIELDS and (before := next(others, None)) is not None:
-            raise act.place.refused(
-                f"*DLOAD gives {key[1]} {_OTHER_FIELDS[key[0]]} than {self._places[before]}, to which programs add it "
-                "or not; expected OP=NEW"
-            )
-        self._terms[key], self._places[key], given[key] = [term], act.place, act.place
-        self._cards[key] = act.card
-
-    def _lasts(self, amplitude: str | None) -> bool:
-        return amplitude is not None and self._amplitudes[amplitude].total
-
-    def _value(self, term: tuple[float, str | None]) -> float:
-        reference, name = term
-        if name is None:
-            return reference
-        amplitude = self._amplitudes[name]
-        return reference * amplitude.at(self._time if amplitude.total else self._period)
-
-    def state(self) -> DeckState:
-        values = {key: sum(map(self._value, terms)) for key, terms in self._terms.items()}
-        return DeckState(values, dict(self._places))
-
-    def _named(self, key: Key) -> str:
-        kind, of, what = key
-        if kind in ("BOUNDARY", "CLOAD"):
-            return f"component {what} of node {self._deck.node_name(int(of))}"
-        return f"{kind} of {of}" if kind in FIELDS else f"{what} of element {self._deck.element_name(int(of))}"
+    begin = DeckState(deck, time=-deck.initial.period)  # what stands before the first step is one that ends at time 0
+    return [*accumulate((deck.initial, *deck.steps), DeckState.after, initial=begin)][2:]
 
 
 def _given_to(deck: Deck, act: Act) -> list[tuple[Key, float]]:

@@ -273,7 +273,7 @@ def _on_nodes(
     points: dict[str, dict[int, float]] = {}
     for (node, component), value in state.of(kind).items():
         row, number = int(node), int(component)
-        place = state.places[kind, node, component]
+        place = state.place((kind, node, component))
         slot = joints.slot(row, number)
         entry = number - 1 if slot is None else slot[1]
         if entry < 0 or (slot is None and number > dimension):
@@ -318,7 +318,7 @@ def _pressures(deck: Deck, parts: DeckParts, state: DeckState) -> dict[str, floa
     for (element, label), value in state.of("DLOAD").items():
         if str(label).startswith("P") and value:
             face = int(str(label)[1:]) - 1
-            place = state.places["DLOAD", element, label]
+            place = state.place(("DLOAD", element, label))
             groups.setdefault((place, value), []).append((int(element), face))
     found = {}
     for (place, value), faces in groups.items():
@@ -334,7 +334,7 @@ def _temperatures(deck: Deck, parts: DeckParts, state: DeckState) -> list[float]
         return []
     used = [deck.materials[section.material].expansion for section, _ in elastic_sections(deck)]
     if not any(np.any(expansion) for expansion in used if expansion is not None):
-        parts.told(next(place for key, place in state.places.items() if key[0] == "TEMPERATURE"), "TEMPERATURE",
+        parts.told(state.place(next(key for key in state.terms if key[0] == "TEMPERATURE")), "TEMPERATURE",
                    "not used: no material has *EXPANSION")  # fmt: skip
         return []
     change = np.zeros(len(deck.points))
@@ -374,7 +374,7 @@ def _by_mass(deck: Deck, state: DeckState, kind: str) -> Iterator[tuple[DeckPlac
         A material has no density.
     """
     for (target, field), value in state.of(kind).items():
-        place = state.places[kind, target, field]
+        place = state.place((kind, target, field))
         wanted = deck.elements_of(str(target), place) if target else np.arange(len(deck.element_labels))
         for section, rows in elastic_sections(deck):
             density = deck.materials[section.material].density
