@@ -11,7 +11,7 @@ import numpy as np
 from enumsol import fem
 from enumsol.errors import InvalidArgumentError
 from enumsol.fem.meshes import MOST_CELLS
-from enumsol.model.shapes import body_shape
+from enumsol.model.shapes import body_mesh
 from enumsol.support.arguments import finite_number, positive_integer, positive_number, shown
 from enumsol.support.array_arguments import short_vector
 
@@ -317,8 +317,8 @@ def pressed_rings(
         friction=friction,
         friction_slope=friction_slope,
     )
-    shape = body_shape(unit)
-    (x, y), (fx, fy) = shape.points.T, (shape.motion @ unit.f).reshape(-1, 2).T
+    mesh = body_mesh(unit)
+    (x, y), (fx, fy) = mesh.points.T, (mesh.motion @ unit.f).reshape(-1, 2).T
     return unit.replace(f=moment / np.sum(x * fy - y * fx) * unit.f)
 
 

@@ -14,7 +14,7 @@ from enumsol.errors import InvalidArgumentError, MissingDependencyError
 from enumsol.model.cells import KINDS, by_kind
 from enumsol.model.problem import ContactProblem
 from enumsol.model.problem3d import ContactProblem3D
-from enumsol.model.shapes import body_shape, row_frames
+from enumsol.model.shapes import body_mesh, contact_forces, row_frames, row_weights
 from enumsol.model.statuses import STATUSES
 from enumsol.support.arguments import file_path
 from enumsol.support.array_arguments import array_of
@@ -195,15 +195,15 @@ def _stresses(problem: AnyProblem, u: Floats) -> dict[str, Floats]:
 
 
 def _plane(meshio: ModuleType, problem: ContactProblem, u: Floats, data: dict[str, Floats]) -> Any:
-    shape = body_shape(problem)
-    nodes, count = np.asarray(shape.weights.argmax(axis=1)).ravel(), len(shape.points)
-    moves = shape.displacements(u)
-    forces = shape.contact_forces(problem, data["lambda_n"], data["lambda_t"])
+    mesh = body_mesh(problem)
+    nodes, count = np.asarray(row_weights(problem).argmax(axis=1)).ravel(), len(mesh.points)
+    moves = mesh.displacements(u)
+    forces = contact_forces(problem, data["lambda_n"], data["lambda_t"])
     point_data = {"displacement": _in_space(moves), "contact_force": _in_space(forces)}
     point_data |= {name: _spread(values, nodes, count) for name, values in data.items()}
-    cells, rows = _in_blocks(2, shape.cells)
+    cells, rows = _in_blocks(2, mesh.cells)
     cell_data = {name: [values[own] for own in rows] for name, values in _stresses(problem, u).items()}
-    return meshio.Mesh(_in_space(shape.points), cells, point_data=point_data, cell_data=cell_data)
+    return meshio.Mesh(_in_space(mesh.points), cells, point_data=point_data, cell_data=cell_data)
 
 
 def _in_blocks(dimension: int, cells: Integers) -> tuple[list[tuple[str, Integers]], list[Integers]]:

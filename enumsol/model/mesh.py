@@ -108,6 +108,11 @@ class BodyMesh(Immutable):
         self._freeze()
 
     @property
+    def size(self) -> float:
+        """The largest extent of the body [length]."""
+        return float(np.max(np.ptp(self.points, axis=0)))
+
+    @property
     def has_material(self) -> bool:
         """True if stresses follow from displacements."""
         return self.lame is not None or self.elasticity is not None

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -32,93 +31,55 @@ _SIDE = float(np.cos(np.radians(30.0)))
 _AZIMUTHS, _ELEVATIONS, _USUAL, _PREFERRED = range(-180, 180, 15), (-35, -20, 20), (-57, 22), 0.2
 
 
-@dataclass(frozen=True)
-class BodyShape:
-    """Shapes that a picture of a problem with a mesh needs, whatever the solution.
-
-    Attributes
-    ----------
-    points : (N, d) array
-        Nodes, d = 2 or 3 [length].
-    cells : (M, k) array of int
-    motion : sparse (d N, n)
-        Displacements of the nodes from u.
-    acting : sparse (d N, n)
-        Forces on the nodes from forces on u.
-    offset : (N, d) array
-        Prescribed displacements [length].
-    weights : sparse (p, N)
-        How much every contact row belongs to every node, rows adding up to 1.
-    """
-
-    points: Floats
-    cells: Integers
-    motion: sp.csr_array
-    acting: sp.csr_array
-    offset: Floats
-    weights: sp.csr_array
-
-    @property
-    def size(self) -> float:
-        """The largest extent of the body [length]."""
-        return float(np.max(np.ptp(self.points, axis=0)))
-
-    def displacements(self, u: Floats) -> Floats:
-        """Displacements of all nodes, (N, d) [length]."""
-        return np.asarray(self.motion @ u).reshape(self.points.shape) + self.offset
-
-    def moves(self, problem: AnyProblem, u: Floats, alpha: AlphaLike) -> Floats:
-        """Displacements of all nodes at a root, (N, d) [length]: zero for a body at rest, where only rounding is left.
-
-        What rounding is is measured by the displacements without contact forces, or, if nothing holds the body, by its
-        size.
-        """
-        found, free = self.displacements(u), self.size
-        if problem.held:
-            none = np.zeros(problem.contact_rows.shape[0])
-            free = largest_length(self.displacements(problem.condensed.displacement(alpha, none)))
-        return found if largest_length(found) > _LEAST_MOVED * free else np.zeros_like(found)
-
-    def contact_forces(self, problem: AnyProblem, lambda_n: Floats, lambda_t: Floats) -> Floats:
-        """Contact forces on all nodes of the body in global axes, (N, d) [force]."""
-        rows = np.concatenate([lambda_n, lambda_t.ravel(order="F")])
-        forces = -np.asarray(self.acting @ (problem.contact_rows.T @ rows)).reshape(self.points.shape)
-        size = np.linalg.norm(forces, axis=1, keepdims=True)
-        return np.asarray(np.where(size > _LEAST_FORCE * np.max(size, initial=0.0), forces, 0.0))
-
-    def at_rows(self, values: Floats) -> Floats:
-        """Values of nodes (N, d) at the contact rows, (p, d)."""
-        return np.asarray(self.weights @ values)
-
-
-def largest_length(vectors: Floats) -> float:
-    """The length of the longest of some vectors."""
-    return float(np.max(np.linalg.norm(vectors, axis=1), initial=0.0))
-
-
-def body_shape(problem: AnyProblem) -> BodyShape:
-    """The shape of a problem in 2D or 3D.
+def body_mesh(problem: AnyProblem) -> BodyMesh:
+    """The mesh of a problem in 2D or 3D.
 
     Raises
     ------
     InvalidArgumentError
         The problem has no mesh.
     """
-    mesh = _mesh_of(problem)
-    points, motion = mesh.points, mesh.motion
-    offset = np.zeros_like(points) if mesh.offset is None else mesh.offset
-    by_node = sp.csr_array(abs(problem.Bn) @ abs(mesh.acting).T)
-    dimension = points.shape[1]
-    gather = sp.kron(sp.eye_array(len(points)), np.ones((dimension, 1)))
-    weights = sp.csr_array(by_node @ gather)
-    scale = 1.0 / np.asarray(weights.sum(axis=1)).ravel()
-    return BodyShape(points, mesh.cells, motion, mesh.acting, offset, sp.csr_array(sp.diags_array(scale) @ weights))
-
-
-def _mesh_of(problem: AnyProblem) -> BodyMesh:
     if problem.mesh is None:
         raise InvalidArgumentError("the problem has no mesh; expected one made by enumsol.fem, or with mesh=")
     return problem.mesh
+
+
+def row_weights(problem: AnyProblem) -> sp.csr_array:
+    """Weights, sparse (p, N), by which every contact row belongs to every node; rows add up to 1."""
+    mesh = body_mesh(problem)
+    by_node = sp.csr_array(abs(problem.Bn) @ abs(mesh.acting).T)
+    count, dimension = mesh.points.shape
+    weights = sp.csr_array(by_node @ sp.kron(sp.eye_array(count), np.ones((dimension, 1))))
+    scale = 1.0 / np.asarray(weights.sum(axis=1)).ravel()
+    return sp.csr_array(sp.diags_array(scale) @ weights)
+
+
+def body_moves(problem: AnyProblem, u: Floats, alpha: AlphaLike) -> Floats:
+    """Displacements of all nodes at a root, (N, d) [length]: zero for a body at rest, where only rounding is left.
+
+    What rounding is is measured by the displacements without contact forces, or, if nothing holds the body, by its
+    size.
+    """
+    mesh = body_mesh(problem)
+    found, free = mesh.displacements(u), mesh.size
+    if problem.held:
+        none = np.zeros(problem.contact_rows.shape[0])
+        free = largest_length(mesh.displacements(problem.condensed.displacement(alpha, none)))
+    return found if largest_length(found) > _LEAST_MOVED * free else np.zeros_like(found)
+
+
+def contact_forces(problem: AnyProblem, lambda_n: Floats, lambda_t: Floats) -> Floats:
+    """Contact forces on all nodes of the body in global axes, (N, d) [force]."""
+    mesh = body_mesh(problem)
+    rows = np.concatenate([lambda_n, lambda_t.ravel(order="F")])
+    forces = -np.asarray(mesh.acting @ (problem.contact_rows.T @ rows)).reshape(mesh.points.shape)
+    size = np.linalg.norm(forces, axis=1, keepdims=True)
+    return np.asarray(np.where(size > _LEAST_FORCE * np.max(size, initial=0.0), forces, 0.0))
+
+
+def largest_length(vectors: Floats) -> float:
+    """The length of the longest of some vectors."""
+    return float(np.max(np.linalg.norm(vectors, axis=1), initial=0.0))
 
 
 def round_scale(largest: float, size: float, share: float = 0.08) -> float:
@@ -144,7 +105,7 @@ def own_scales(largest: Sequence[float], size: float) -> tuple[float, ...]:
 
 def _directions(problem: AnyProblem) -> Floats:
     """The normals and the tangents of the contact rows, summed over the nodes of a row, in global axes, (p, d, d)."""
-    rows = _mesh_of(problem).directions(problem.contact_rows)
+    rows = body_mesh(problem).directions(problem.contact_rows)
     return rows.reshape(-1, problem.p, rows.shape[1]).swapaxes(0, 1)
 
 

@@ -17,7 +17,16 @@ import scipy.sparse as sp
 from enumsol._version import find_version
 from enumsol.errors import MissingDependencyError
 from enumsol.model.cells import boundary, boundary_facets, edges_of, facet_outlines, outline_edges
-from enumsol.model.shapes import SIGNS, BodyShape, acting_nodes, body_shape, first_view, row_frames, row_tangents, signs
+from enumsol.model.shapes import (
+    SIGNS,
+    acting_nodes,
+    body_mesh,
+    first_view,
+    row_frames,
+    row_tangents,
+    row_weights,
+    signs,
+)
 from enumsol.model.statuses import ContactStatus
 
 if TYPE_CHECKING:
@@ -26,6 +35,7 @@ if TYPE_CHECKING:
     from enumsol.branches import BranchGraph
     from enumsol.fem import Scene
     from enumsol.loading.history import History
+    from enumsol.model.mesh import BodyMesh
     from enumsol.model.problem3d import AnyProblem
     from enumsol.roots.root_set import RootSet
     from enumsol.support.array_types import ArrayLike, Floats, Integers
@@ -51,22 +61,23 @@ def body_record(problem: AnyProblem, scene: Scene | None = None) -> tuple[dict[s
         return body | {"u0": still, "u1": still, "c": [[]] * len(still), "acts": [[]] * len(still)}, why
     if not problem.held:
         return None, "Nothing holds the body, and arcs do not say how far it moves as a whole; roots_at(alpha) does"
-    shape = body_shape(problem)
-    d = shape.points.shape[1]
+    mesh = problem.mesh
+    d = mesh.points.shape[1]
     columns = d * problem.p + 2
-    body, nodes = drawn_body(problem, shape, columns, scene)
+    body, nodes = drawn_body(problem, columns, scene)
     if columns > most_fields(len(nodes), d):
         return None, (
             f"The mesh is too large to draw: the displacements of {len(nodes):,} nodes on its boundary by "
             f"{d * problem.p:,} contact forces and the load are {d * len(nodes) * columns:,} numbers, and a page holds "
             f"at most {_MOST_NUMBERS:,}"
         )
-    motion = sp.csr_array(shape.motion[(d * nodes[:, None] + np.arange(d)).ravel()])
+    motion = sp.csr_array(mesh.motion[(d * nodes[:, None] + np.arange(d)).ravel()])
     solved = [problem.factorization.solve(np.asarray(column)) for column in _loads(problem)]
     moved = [motion @ column for column in solved]
-    moved[0] = moved[0] + shape.offset[nodes].ravel()
-    forces = -sp.csr_array(problem.contact_rows @ shape.acting.T).toarray().reshape(d * problem.p, -1, d)
-    return body | _stress_columns(problem, shape, solved) | {
+    if mesh.offset is not None:
+        moved[0] = moved[0] + mesh.offset[nodes].ravel()
+    forces = -sp.csr_array(problem.contact_rows @ mesh.acting.T).toarray().reshape(d * problem.p, -1, d)
+    return body | _stress_columns(problem, solved) | {
         "u0": short_list(moved[0]),
         "u1": short_list(moved[1]),
         "c": [short_list(column) for column in moved[2:]],
@@ -74,9 +85,9 @@ def body_record(problem: AnyProblem, scene: Scene | None = None) -> tuple[dict[s
     }, ""
 
 
-def _stress_columns(problem: AnyProblem, shape: BodyShape, solved: Sequence[Floats]) -> dict[str, Any]:
+def _stress_columns(problem: AnyProblem, solved: Sequence[Floats]) -> dict[str, Any]:
     """Stresses on the surface of a solid by columns, as displacements are given, if the page holds them."""
-    of = surface_stresses(problem, shape, len(solved))
+    of = surface_stresses(problem, len(solved))
     if of is None:
         return {}
     still = of(np.zeros(problem.n))
@@ -84,14 +95,15 @@ def _stress_columns(problem: AnyProblem, shape: BodyShape, solved: Sequence[Floa
     return {"s0": first, "s1": others[0], "s": others[1:]}
 
 
-def surface_stresses(problem: AnyProblem, shape: BodyShape, columns: int) -> Callable[[Floats], Floats] | None:
+def surface_stresses(problem: AnyProblem, columns: int) -> Callable[[Floats], Floats] | None:
     """The function from u to stresses of the cells at the facets of a solid's surface, xx, yy, zz, yz, zx, xy in turn.
 
     None for a plane body, for one of which no material is known, and where a page does not hold so many columns.
     """
-    if shape.points.shape[1] != 3 or problem.mesh is None or not problem.mesh.has_material:
+    mesh = body_mesh(problem)
+    if mesh.points.shape[1] != 3 or not mesh.has_material:
         return None
-    _, cells = boundary(3, shape.cells)
+    _, cells = boundary(3, mesh.cells)
     if 6 * len(cells) * columns > _MOST_NUMBERS:
         return None
     from enumsol.fem import cell_stresses  # scikit-fem takes a while
@@ -104,9 +116,7 @@ def most_fields(nodes: int, d: int) -> int:
     return _MOST_NUMBERS // (d * nodes)
 
 
-def drawn_body(
-    problem: AnyProblem, shape: BodyShape, columns: int, scene: Scene | None = None
-) -> tuple[dict[str, Any], Integers]:
+def drawn_body(problem: AnyProblem, columns: int, scene: Scene | None = None) -> tuple[dict[str, Any], Integers]:
     """Drawing of a body apart from any solution, and the numbers of the drawn nodes in its mesh.
 
     ``points`` are the drawn nodes; contact row i stands at the mean of nodes ``rows[i]``, pairs (node, weight). Of a
@@ -115,8 +125,9 @@ def drawn_body(
     ``tangents`` of the contact rows, two vectors each, and a ``view``, the direction out of the body from which its
     contact surface is seen best. What `surroundings` gives is about a solid, too.
     """
-    cells, d, new = shape.cells, shape.points.shape[1], np.full(len(shape.points), -1)
-    touched = np.unique(sp.csr_array(problem.contact_rows @ shape.acting.T).indices // d)
+    mesh = body_mesh(problem)
+    cells, d, new = mesh.cells, mesh.points.shape[1], np.full(len(mesh.points), -1)
+    touched = np.unique(sp.csr_array(problem.contact_rows @ mesh.acting.T).indices // d)
     if d == 3:
         faces = facet_outlines(boundary_facets(3, cells))
         nodes = np.union1d(faces, touched)
@@ -126,28 +137,28 @@ def drawn_body(
         if columns > most_fields(len(new), d):
             nodes = np.union1d(edges, touched)
     new[nodes] = np.arange(len(nodes))
-    body = {"points": short_list(shape.points[nodes]), "rows": _rows(shape, nodes), "size": shape.size}
+    body = {"points": short_list(mesh.points[nodes]), "rows": _rows(row_weights(problem), nodes), "size": mesh.size}
     if d == 3:
-        more = surroundings(problem, shape, new, edges_of(faces), scene) | {
+        more = surroundings(problem, new, edges_of(faces), scene) | {
             "tangents": short_list(row_tangents(problem)),
             "view": short_list(first_view(row_frames(problem)[:, 0])),
         }
-        if problem.mesh is not None and problem.mesh.lame is not None:
-            more["mu"] = float(np.max(problem.mesh.lame[:, 1]))
-        return body | _surface(shape, faces, new) | more, nodes
+        if mesh.lame is not None:
+            more["mu"] = float(np.max(mesh.lame[:, 1]))
+        return body | _surface(mesh, faces, new) | more, nodes
     whole = len(nodes) == len(new)
     return body | {
         "cells": new[cells].tolist() if whole else None,
         "lines": None if whole else new[edges].tolist(),
         "rim": new[edges].tolist(),
-        **surroundings(problem, shape, new, edges, scene),
-        **_foundation(problem, shape),
+        **surroundings(problem, new, edges, scene),
+        **_foundation(problem),
     }, nodes
 
 
-def _surface(shape: BodyShape, faces: Integers, new: Integers) -> dict[str, Any]:
+def _surface(mesh: BodyMesh, faces: Integers, new: Integers) -> dict[str, Any]:
     """Triangles and edges of the surface of a solid."""
-    outline = outline_edges(shape.points, faces)
+    outline = outline_edges(mesh.points, faces)
     fan = np.concatenate([faces[:, [0, k, k + 1]] for k in range(1, faces.shape[1] - 1)])
     fan = fan[fan[:, 1] != fan[:, 2]]  # outlines of fewer nodes than others repeat their last
     return {
@@ -173,9 +184,7 @@ def bare_nodes(problem: AnyProblem) -> tuple[dict[str, Any] | None, str]:
     return body, "The problem has no mesh: its contact nodes are drawn at their coordinates, without forces"
 
 
-def surroundings(
-    problem: AnyProblem, shape: BodyShape, new: Integers, edges: Integers, scene: Scene | None = None
-) -> dict[str, Any]:
+def surroundings(problem: AnyProblem, new: Integers, edges: Integers, scene: Scene | None = None) -> dict[str, Any]:
     """Load, supports and springs of a body, for the page: of many nodes side by side some stand for all.
 
     ``new`` is the number of every node among those that are drawn, -1 for others; ``edges`` are those of the boundary.
@@ -183,19 +192,20 @@ def surroundings(
     of it is the sum over several nodes; ``held`` a node and a direction in which it cannot move, or zeros for several;
     ``springs`` nodes.
     """
-    motion, (count, d) = shape.motion, shape.points.shape
+    mesh = body_mesh(problem)
+    motion, (count, d) = mesh.motion, mesh.points.shape
     slope = np.zeros(problem.n) if problem.load_slope is None else problem.load_slope
     # what nothing is coupled with is held, or moved as alpha says
     coupled = np.diff(problem.A.indptr) > 1
-    forces = np.hstack([(shape.acting @ np.where(coupled, own, 0.0)).reshape(-1, d) for own in (problem.f, slope)])
+    forces = np.hstack([(mesh.acting @ np.where(coupled, own, 0.0)).reshape(-1, d) for own in (problem.f, slope)])
     acting = acting_nodes(forces)
     if len(np.setdiff1d(acting, edges)) > SIGNS:  # a weight: its resultant
         weights = np.linalg.norm(forces[acting], axis=1)
-        load = np.hstack([weights @ shape.points[acting] / weights.sum(), forces.sum(axis=0)])[None, :]
+        load = np.hstack([weights @ mesh.points[acting] / weights.sum(), forces.sum(axis=0)])[None, :]
         summed = True
     else:
-        shown = signs(shape.points, acting, edges)
-        load = np.array([[*shape.points[node], *forces[group].sum(axis=0)] for node, group in shown])
+        shown = signs(mesh.points, acting, edges)
+        load = np.array([[*mesh.points[node], *forces[group].sum(axis=0)] for node, group in shown])
         summed = len(shown) < len(acting)
     axes = [motion[k::d] for k in range(d)]
     free = np.array([[np.asarray(a.multiply(b).sum(axis=1)).ravel() for a in axes] for b in axes])
@@ -208,26 +218,27 @@ def surroundings(
     held: list[Any] = []
     for kind in np.unique(across[(fixed > 0) & drawn].round(6), axis=0):
         alike = np.flatnonzero((fixed > 0) & drawn & np.all(across.round(6) == kind, axis=1))
-        held += [[int(new[k]), *short_list(across[k])] for k, _ in signs(shape.points, alike, edges)]
+        held += [[int(new[k]), *short_list(across[k])] for k, _ in signs(mesh.points, alike, edges)]
     sprung: Any = [] if scene is None else acting_nodes(scene.springs.diagonal()[: count * d].reshape(count, d))
     sprung = np.array([node for node in sprung if drawn[node]], dtype=int)
-    springs = [int(new[node]) for node, _ in signs(shape.points, sprung, edges)]
+    springs = [int(new[node]) for node, _ in signs(mesh.points, sprung, edges)]
     return {"load": short_list(load), "summed": summed, "held": held, "springs": springs}
 
 
-def _foundation(problem: AnyProblem, shape: BodyShape) -> dict[str, Any]:
+def _foundation(problem: AnyProblem) -> dict[str, Any]:
     """Foundation and material of a plane body.
 
     ``walls`` has (row, x, y, gap), normals of the rigid foundation; ``lame`` the coefficients of the cells, one pair if
     all are the same.
     """
-    normals = np.asarray(problem.Bn @ shape.acting.T @ np.tile(np.eye(2), (len(shape.points), 1)))
+    mesh = body_mesh(problem)
+    normals = np.asarray(problem.Bn @ mesh.acting.T @ np.tile(np.eye(2), (len(mesh.points), 1)))
     walls = [
         [k, *short_list([*normal, problem.gap[k]])]
         for k, normal in enumerate(normals)
         if abs(normal @ normal - 1.0) < _ROUNDING  # rows of two bodies add up to nothing
     ]
-    lame = None if problem.mesh is None else problem.mesh.lame
+    lame = mesh.lame
     if lame is not None and np.all(lame == lame[0]):
         lame = lame[:1]
     return {"walls": walls, "lame": None if lame is None else short_list(lame)}
@@ -238,9 +249,9 @@ def _loads(problem: AnyProblem) -> list[Floats]:
     return [problem.f, slope, *problem.contact_rows.toarray()]
 
 
-def _rows(shape: BodyShape, nodes: Integers) -> list[list[list[float]]]:
+def _rows(weights: sp.csr_array, nodes: Integers) -> list[list[list[float]]]:
     """At which mean of drawn nodes every contact row stands: pairs (node, weight)."""
-    weights = sp.csr_array(shape.weights[:, nodes])
+    weights = sp.csr_array(weights[:, nodes])
     parts = zip(weights.indptr[:-1], weights.indptr[1:], strict=True)
     return [
         [

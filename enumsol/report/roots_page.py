@@ -12,7 +12,7 @@ import numpy as np
 
 from enumsol.errors import InvalidArgumentError
 from enumsol.loading.history_data import steps_table, tree_lines
-from enumsol.model.shapes import body_shape
+from enumsol.model.shapes import body_moves, contact_forces
 from enumsol.report import parts
 from enumsol.roots.root import summary
 from enumsol.roots.root_set import ABOUT_STABILITY
@@ -238,16 +238,15 @@ def _pictures(roots: Sequence[Root], scene: Scene | None) -> tuple[dict[str, Any
         body, why = parts.bare_nodes(problem)
         still = [] if body is None else [{"u": [0] * (3 * problem.p), "forces": []}] * len(roots)
         return _picture(body, why), still
-    shape = body_shape(problem)
-    body, nodes = parts.drawn_body(problem, shape, len(roots) + 1, scene)
-    count = parts.most_fields(*shape.points[nodes].shape) - 1
+    body, nodes = parts.drawn_body(problem, len(roots) + 1, scene)
+    count = parts.most_fields(*problem.mesh.points[nodes].shape) - 1
     if count < 1:
         return _picture(None, f"The mesh is too large to draw: its boundary alone has {len(nodes):,} nodes"), []
-    stresses = parts.surface_stresses(problem, shape, min(count, len(roots)))
+    stresses = parts.surface_stresses(problem, min(count, len(roots)))
     bodies = [
         {
-            "u": parts.short_list(shape.moves(root.problem, root.u, root.alpha)[nodes].ravel()),
-            "forces": parts.vectors(shape.contact_forces(problem, root.lambda_n, root.lambda_t), nodes),
+            "u": parts.short_list(body_moves(root.problem, root.u, root.alpha)[nodes].ravel()),
+            "forces": parts.vectors(contact_forces(problem, root.lambda_n, root.lambda_t), nodes),
             **({} if stresses is None else {"s": parts.short_list(stresses(root.u))}),
         }
         for root in roots[:count]

@@ -10,13 +10,15 @@ from enumsol.errors import InvalidArgumentError
 from enumsol.model.cells import boundary_facets, facet_outlines, outline_edges
 from enumsol.model.shapes import (
     SLIP_ARROW,
-    BodyShape,
     arrow_scale,
-    body_shape,
+    body_mesh,
+    body_moves,
+    contact_forces,
     first_view,
     largest_length,
     own_scales,
     row_frames,
+    row_weights,
     slip_directions,
 )
 from enumsol.model.statuses import ContactStatus
@@ -30,6 +32,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
     from mpl_toolkits.mplot3d import Axes3D
 
+    from enumsol.model.mesh import BodyMesh
     from enumsol.model.problem3d import AnyProblem, ContactProblem3D
     from enumsol.roots.local_branch import ContactState
     from enumsol.support.array_types import Floats, Indices
@@ -60,21 +63,21 @@ def draw_body(
 ) -> Any:
     """A figure of one deformed body; see Root.plot_body."""
     ax = axes_or_none(place)
-    shape = body_shape(problem)
-    (factor,), arrows = _factors([root], problem, shape, scale)
+    mesh = body_mesh(problem)
+    (factor,), arrows = _factors([root], problem, scale)
     if ax is None:
         figure = new_figure(figsize=(6.4, 5.0))
-        ax = _axes(figure, (1, 1, 1), shape)
-    elif shape.points.shape[1] == 3 and not hasattr(ax, "set_zlim"):
+        ax = _axes(figure, (1, 1, 1), mesh)
+    elif mesh.points.shape[1] == 3 and not hasattr(ax, "set_zlim"):
         raise InvalidArgumentError("ax is plane and the body is not; expected Axes with projection '3d', or None")
-    _draw(ax, root, problem, shape, factor, arrows)
+    _draw(ax, root, problem, factor, arrows)
     ax.set_title(
         f"alpha = {float(root.alpha):g}, {_index(root)}; {_scale_words(factor)}",
         fontsize=9,
-        pad=_PAD[shape.points.shape[1]],
+        pad=_PAD[mesh.points.shape[1]],
     )
-    _name_axes(ax, shape.points.shape[1], units)
-    _legend(ax, [root], _strongest([root], problem, shape), units)
+    _name_axes(ax, mesh.points.shape[1], units)
+    _legend(ax, [root], _strongest([root], problem), units)
     return figure_of(ax)
 
 
@@ -83,25 +86,25 @@ def draw_bodies(roots: Sequence[Any], scale: float | None = None, units: tuple[s
     if not roots:
         raise InvalidArgumentError("there are no isolated roots to draw; expected at least one")
     problem = roots[0].problem
-    shape = body_shape(problem)
+    mesh = body_mesh(problem)
     drawn = roots[:12]
-    factors, arrows = _factors(drawn, problem, shape, scale)
+    factors, arrows = _factors(drawn, problem, scale)
     across = min(3, len(drawn))
     rows = -(-len(drawn) // across)
     figure = new_figure(figsize=(4.0 * across, 3.6 * rows + 0.8))
     one_scale = len(set(factors)) == 1
     for k, (root, factor) in enumerate(zip(drawn, factors, strict=True)):
-        ax = _axes(figure, (rows, across, k + 1), shape)
-        _draw(ax, root, problem, shape, factor, arrows)
+        ax = _axes(figure, (rows, across, k + 1), mesh)
+        _draw(ax, root, problem, factor, arrows)
         own = "" if one_scale else f"; {_scale_words(factor)}"
-        ax.set_title(f"root {k}: {_index(root)}{own}", fontsize=9, pad=_PAD[shape.points.shape[1]])
-        _name_axes(ax, shape.points.shape[1], units)
-    if shape.points.shape[1] == 3:
+        ax.set_title(f"root {k}: {_index(root)}{own}", fontsize=9, pad=_PAD[mesh.points.shape[1]])
+        _name_axes(ax, mesh.points.shape[1], units)
+    if mesh.points.shape[1] == 3:
         _same_view(figure.axes)
     shown = f", the first {len(drawn)} of {len(roots)} roots" if len(drawn) < len(roots) else ""
     words = _scale_words(factors[0]) if one_scale else "every body with an enlargement of its own"
     figure.suptitle(f"alpha = {float(drawn[0].alpha):g}, {words}{shown}", fontsize=10)
-    _legend(figure, drawn, _strongest(drawn, problem, shape), units)
+    _legend(figure, drawn, _strongest(drawn, problem), units)
     return figure
 
 
@@ -113,31 +116,31 @@ def _scale_words(scale: float) -> str:
     return f"displacements times {scale:g}"
 
 
-def _strongest(roots: Sequence[ContactState], problem: AnyProblem, shape: BodyShape) -> float:
+def _strongest(roots: Sequence[ContactState], problem: AnyProblem) -> float:
     """The largest nodal contact force of several roots [force]."""
-    return max(largest_length(shape.contact_forces(problem, root.lambda_n, root.lambda_t)) for root in roots)
+    return max(largest_length(contact_forces(problem, root.lambda_n, root.lambda_t)) for root in roots)
 
 
-def _factors(
-    roots: Sequence[Any], problem: AnyProblem, shape: BodyShape, scale: float | None
-) -> tuple[tuple[float, ...], float]:
+def _factors(roots: Sequence[Any], problem: AnyProblem, scale: float | None) -> tuple[tuple[float, ...], float]:
     """Factors of the displacements of each root, and one of all forces."""
-    arrows = arrow_scale(_strongest(roots, problem, shape), shape.size)
+    size = body_mesh(problem).size
+    arrows = arrow_scale(_strongest(roots, problem), size)
     if scale is not None:
         return (positive_number(scale, "scale"),) * len(roots), arrows
-    moved = [largest_length(shape.moves(root.problem, root.u, root.alpha)) for root in roots]
-    return own_scales(moved, shape.size), arrows
+    moved = [largest_length(body_moves(root.problem, root.u, root.alpha)) for root in roots]
+    return own_scales(moved, size), arrows
 
 
-def _axes(figure: Figure, place: tuple[int, int, int], shape: BodyShape) -> Any:
-    return figure.add_subplot(*place, projection="3d" if shape.points.shape[1] == 3 else None)
+def _axes(figure: Figure, place: tuple[int, int, int], mesh: BodyMesh) -> Any:
+    return figure.add_subplot(*place, projection="3d" if mesh.points.shape[1] == 3 else None)
 
 
-def _draw(ax: Axes3D, root: Any, problem: AnyProblem, shape: BodyShape, scale: float, arrows: float) -> None:
-    moves = scale * shape.moves(root.problem, root.u, root.alpha)
-    points = shape.points + moves
-    places = shape.at_rows(points)
-    forces = arrows * shape.contact_forces(problem, root.lambda_n, root.lambda_t)
+def _draw(ax: Axes3D, root: Any, problem: AnyProblem, scale: float, arrows: float) -> None:
+    mesh = body_mesh(problem)
+    moves = scale * body_moves(root.problem, root.u, root.alpha)
+    points = mesh.points + moves
+    places = row_weights(problem) @ points
+    forces = arrows * contact_forces(problem, root.lambda_n, root.lambda_t)
     pressed = np.flatnonzero(np.any(forces != 0, axis=1))
     plane = points.shape[1] == 2
     if len(pressed):
@@ -145,20 +148,20 @@ def _draw(ax: Axes3D, root: Any, problem: AnyProblem, shape: BodyShape, scale: f
         look = _ARROW if plane else {"linewidth": 1.8, "arrow_length_ratio": 0.3, "zorder": 4}
         ax.quiver(*(points - forces)[pressed].T, *forces[pressed].T, color=_FORCE, **look)
     if plane:
-        _plane(ax, shape, points)
+        _plane(ax, mesh, points)
         if len(pressed):
             ax.update_datalim((points - forces)[pressed])
         ax.set_aspect("equal", adjustable="datalim")
         ax.margins(0.08)
     else:
-        _solid(ax, shape, points)
+        _solid(ax, mesh, points)
         x, y, z = first_view(row_frames(problem)[:, 0])
         ax.view_init(elev=np.degrees(np.arcsin(z)), azim=np.degrees(np.arctan2(y, x)))
         slides, ways = slip_directions(problem, root.u_t, root.statuses)
         if len(slides):
             look = {"linewidth": 1.8, "arrow_length_ratio": 0.4, "zorder": 4}
-            ax.quiver(*places[slides].T, *(SLIP_ARROW * shape.size * ways).T, color=_SLIP, **look)
-        ax.auto_scale_xyz(*np.concatenate([shape.points, points, (points - forces)[pressed]]).T)
+            ax.quiver(*places[slides].T, *(SLIP_ARROW * mesh.size * ways).T, color=_SLIP, **look)
+        ax.auto_scale_xyz(*np.concatenate([mesh.points, points, (points - forces)[pressed]]).T)
         ax.locator_params(nbins=4)
         ax.tick_params(labelsize=7, pad=0)
         ax.set_aspect("equal")
@@ -178,21 +181,21 @@ def _same_view(axes: Sequence[Any]) -> None:
         ax.set_aspect("equal")
 
 
-def _plane(ax: Axes, shape: BodyShape, points: Floats) -> None:
+def _plane(ax: Axes, mesh: BodyMesh, points: Floats) -> None:
     from matplotlib.collections import PolyCollection
 
-    cells = facet_outlines(shape.cells)
-    ax.add_collection(PolyCollection(list(shape.points[cells]), facecolors="none", edgecolors=_BEFORE, linewidths=0.5))
+    cells = facet_outlines(mesh.cells)
+    ax.add_collection(PolyCollection(list(mesh.points[cells]), facecolors="none", edgecolors=_BEFORE, linewidths=0.5))
     ax.add_collection(PolyCollection(list(points[cells]), facecolors=_BODY, edgecolors=_EDGE, linewidths=0.6))
-    for positions in (shape.points, points):
+    for positions in (mesh.points, points):
         ax.update_datalim(positions)
 
 
-def _solid(ax: Axes3D, shape: BodyShape, points: Floats) -> None:
+def _solid(ax: Axes3D, mesh: BodyMesh, points: Floats) -> None:
     from mpl_toolkits.mplot3d.art3d import Line3DCollection, Poly3DCollection
 
-    faces = facet_outlines(boundary_facets(3, shape.cells))
-    edges = shape.points[outline_edges(shape.points, faces)]
+    faces = facet_outlines(boundary_facets(3, mesh.cells))
+    edges = mesh.points[outline_edges(mesh.points, faces)]
     ax.computed_zorder = False  # forces and marks are seen through the body
     look = {"facecolors": _BODY, "edgecolors": _EDGE, "linewidths": 0.4, "alpha": 0.35}
     ax.add_collection3d(Poly3DCollection(list(points[faces]), zorder=2, **look))

@@ -16,7 +16,7 @@ from refusals import bad_argument, refusal
 import enumsol
 from enumsol import MissingDependencyError, branch_graph, enumerate_roots, fem, gallery, histories, write_report
 from enumsol.model.cells import boundary_facets
-from enumsol.model.shapes import body_shape
+from enumsol.model.shapes import contact_forces
 from enumsol.report import graph_page as content, parts as bodies, roots_page
 from enumsol.report.graph_page import slider_alphas
 from enumsol.report.parts import body_record, short_list
@@ -105,7 +105,7 @@ def test_bodies_move_as_the_roots_say(wedge, wedge_page):
         for force, acts in zip(forces, body["acts"], strict=True):
             for node, x, y in acts:
                 nodal[node] += force * np.array([x, y])
-        expected = body_shape(wedge.problem).contact_forces(wedge.problem, root.lambda_n, root.lambda_t)
+        expected = contact_forces(wedge.problem, root.lambda_n, root.lambda_t)
         np.testing.assert_allclose(nodal, expected, atol=1e-8 * max(np.max(np.abs(expected)), 1e-30))
     assert [[node for node, _ in row] for row in body["rows"]] == [[node] for node in wedge.problem.node_ids]
 

@@ -15,7 +15,7 @@ from refusals import bad_argument, refusal
 import enumsol
 from enumsol import MissingDependencyError, enumerate_roots, fem, gallery, write_report
 from enumsol.fem.bases import von_mises
-from enumsol.model.shapes import body_shape, slip_directions
+from enumsol.model.shapes import body_mesh, contact_forces, slip_directions
 from enumsol.report import parts, roots_page
 
 pytest.importorskip("plotly")
@@ -61,11 +61,11 @@ def pages(found, tmp_path_factory):
 def test_bodies_and_forces_are_those_of_the_roots(found, pages, name):
     data, roots = data_of(pages[name]), found[name]
     problem = roots[0].problem
-    shape, d = body_shape(problem), problem.mesh.points.shape[1]
+    mesh, d = body_mesh(problem), problem.mesh.points.shape[1]
     points = np.array(data["body"]["points"])
     # each drawn point is a node of the mesh
-    node = [int(np.argmin(np.linalg.norm(shape.points - point, axis=1))) for point in points]
-    np.testing.assert_allclose(shape.points[node], points, atol=1e-6)
+    node = [int(np.argmin(np.linalg.norm(mesh.points - point, axis=1))) for point in points]
+    np.testing.assert_allclose(mesh.points[node], points, atol=1e-6)
     assert len(data["roots"]) == len(roots)
     for record, root in zip(data["roots"], roots, strict=True):
         assert [data["statuses"][int(code)] for code in record["statuses"]] == [s.value for s in root.statuses]
@@ -73,10 +73,10 @@ def test_bodies_and_forces_are_those_of_the_roots(found, pages, name):
         np.testing.assert_allclose(record["w"], np.concatenate([root.u_n, root.u_t.ravel("F")]), rtol=1e-6)
         moved = problem.mesh.displacements(root.u)
         np.testing.assert_allclose(np.reshape(record["u"], (-1, d)), moved[node], rtol=1e-5, atol=1e-6 * np.max(moved))
-        forces = np.zeros_like(shape.points)
+        forces = np.zeros_like(mesh.points)
         for k, *force in record["forces"]:
             forces[node[k]] = force
-        expected = shape.contact_forces(problem, root.lambda_n, root.lambda_t)
+        expected = contact_forces(problem, root.lambda_n, root.lambda_t)
         np.testing.assert_allclose(forces, expected, rtol=1e-5, atol=1e-6 * np.max(np.abs(expected), initial=0))
         if d == 3:
             rows, ways = slip_directions(problem, root.u_t, root.statuses)
@@ -257,12 +257,12 @@ def check_scenes(browser, roots):
     traces = "scenes.map((s) => s.data.filter((t) => {0}).map((t) => [t.name, t.x.length]))"
     cones = browser.evaluate(traces.replace("{0}", "t.type === 'cone'"))
     marks = browser.evaluate(traces.replace("{0}", "t.mode === 'markers' && data.statuses.includes(t.name)"))
-    shape = body_shape(roots[0].problem)
+    mesh = body_mesh(roots[0].problem)
     for root, arrows, marked in zip(roots, cones, marks, strict=True):
         names = [status.value for status in root.statuses]
-        forces = shape.contact_forces(root.problem, root.lambda_n, root.lambda_t)
+        forces = contact_forces(root.problem, root.lambda_n, root.lambda_t)
         expected = {"force": int(np.sum(np.any(forces != 0, axis=1))), "way of slip": names.count("slip")}
-        expected |= {"load": int(np.sum(np.any((shape.motion @ root.problem.f).reshape(-1, 3), axis=1))), "scale": 1}
+        expected |= {"load": int(np.sum(np.any((mesh.motion @ root.problem.f).reshape(-1, 3), axis=1))), "scale": 1}
         assert dict(arrows) == {name: count for name, count in expected.items() if count}
         assert dict(marked) == {name: names.count(name) for name in set(names)}
     check_first_view(browser, roots)

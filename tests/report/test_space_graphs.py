@@ -15,7 +15,7 @@ import enumsol
 from enumsol import branch_graph, fem, gallery, write_report
 from enumsol.branches import ways
 from enumsol.branches.figures.curves import QUANTITIES, curves
-from enumsol.model.shapes import body_shape
+from enumsol.model.shapes import body_mesh, contact_forces
 from enumsol.report.parts import given_section
 
 pytest.importorskip("plotly")
@@ -96,20 +96,20 @@ def test_the_bodies_of_a_graph_move_as_the_roots_say(wedge, wedge_page):
     data = data_of(wedge_page)
     check_arcs(data, wedge)
     body, alpha = data["body"], 1.02
-    shape = body_shape(wedge.problem)
-    node = [int(np.argmin(np.linalg.norm(shape.points - point, axis=1))) for point in np.array(body["points"])]
+    mesh = body_mesh(wedge.problem)
+    node = [int(np.argmin(np.linalg.norm(mesh.points - point, axis=1))) for point in np.array(body["points"])]
     roots = wedge.roots_at(alpha)
     assert len(roots) == 3
     for root in roots:
         forces = np.concatenate([root.lambda_n, root.lambda_t.ravel("F")])
         u = np.array(body["u0"]) + alpha * np.array(body["u1"]) - forces @ np.array(body["c"])
         terms = np.max(np.abs(body["u0"])) + np.max(np.abs(forces) @ np.abs(body["c"]))
-        np.testing.assert_allclose(u.reshape(-1, 3), shape.displacements(root.u)[node], atol=1e-6 * terms)
-        nodal = np.zeros_like(shape.points)
+        np.testing.assert_allclose(u.reshape(-1, 3), mesh.displacements(root.u)[node], atol=1e-6 * terms)
+        nodal = np.zeros_like(mesh.points)
         for force, acts in zip(forces, body["acts"], strict=True):
             for k, *act in acts:
                 nodal[node[k]] += force * np.array(act)
-        expected = shape.contact_forces(wedge.problem, root.lambda_n, root.lambda_t)
+        expected = contact_forces(wedge.problem, root.lambda_n, root.lambda_t)
         np.testing.assert_allclose(nodal, expected, atol=1e-6 * np.max(np.abs(expected), initial=1e-30))
 
 
@@ -167,10 +167,9 @@ def test_bodies_follow_the_slider(browser, wedge_page, wedge):
     # a browser makes few of them: they are taken again
     assert browser.evaluate("scenes.every((s, k) => s === first[k] && s.isConnected)")
     cones = browser.evaluate("scenes.map((s) => s.data.filter((t) => t.type === 'cone').map((t) => t.x.length))")
-    shape = body_shape(wedge.problem)
     expected = []
     for root in wedge.roots_at(1.02):
-        forces = shape.contact_forces(wedge.problem, root.lambda_n, root.lambda_t)
+        forces = contact_forces(wedge.problem, root.lambda_n, root.lambda_t)
         counts = [int(np.sum(np.any(forces != 0, axis=1))), sum(s.value == "slip" for s in root.statuses)]
         expected.append([count for count in counts if count])
     assert sorted(cones) == sorted(expected)

@@ -13,7 +13,15 @@ from refusals import bad_argument, bad_problem
 import enumsol
 from enumsol import BodyMesh, fem
 from enumsol.model.cells import boundary_facets, facet_outlines, outline_edges
-from enumsol.model.shapes import body_shape, own_scales, round_scale, slip_directions
+from enumsol.model.shapes import (
+    body_mesh,
+    body_moves,
+    contact_forces,
+    own_scales,
+    round_scale,
+    row_weights,
+    slip_directions,
+)
 from enumsol.roots.body_plots import draw_bodies
 from enumsol.support.plotting import new_figure
 
@@ -26,20 +34,20 @@ def wedge():
 
 def test_displacements_and_forces_in_global_axes(wedge):
     problem, roots = wedge
-    shape = body_shape(problem)
+    mesh = body_mesh(problem)
     c, s = np.cos(np.radians(20)), np.sin(np.radians(20))
     normals = np.repeat([[-c, -s], [c, -s]], 4, axis=0)
     tangents = np.repeat([[-s, c], [s, c]], 4, axis=0)
     assert len(roots) == 5
     for root in roots:
-        moves = shape.at_rows(shape.displacements(root.u))
+        moves = row_weights(problem) @ mesh.displacements(root.u)
         np.testing.assert_allclose(np.sum(moves * normals, axis=1) - problem.gap, root.u_n, atol=1e-12)
         np.testing.assert_allclose(np.sum(moves * tangents, axis=1), root.u_t, atol=1e-12)
-        forces = shape.contact_forces(problem, root.lambda_n, root.lambda_t)
+        forces = contact_forces(problem, root.lambda_n, root.lambda_t)
         expected = np.zeros_like(forces)
         expected[list(problem.node_ids)] = -(root.lambda_n[:, None] * normals + root.lambda_t[:, None] * tangents)
         np.testing.assert_allclose(forces, expected, atol=1e-12 * max(np.max(root.lambda_n), 1e-30))
-    np.testing.assert_allclose(shape.at_rows(shape.points), problem.coordinates, atol=1e-15)
+    np.testing.assert_allclose(row_weights(problem) @ mesh.points, problem.coordinates, atol=1e-15)
 
 
 def test_turned_degrees_of_freedom_of_the_square():
@@ -59,8 +67,8 @@ def test_what_is_drawn(wedge):
     assert "displacements times 20" in ax.get_title()
     (arrows,) = [part for part in ax.collections if hasattr(part, "U")]
     assert len(arrows.U) == np.count_nonzero(root.lambda_n)
-    shape = body_shape(problem)
-    moved = shape.at_rows(shape.points + 20 * shape.displacements(root.u))
+    mesh = body_mesh(problem)
+    moved = row_weights(problem) @ (mesh.points + 20 * mesh.displacements(root.u))
     drawn = np.concatenate([np.stack(line.get_data(), axis=1) for line in ax.lines])
     assert {tuple(point) for point in drawn.round(9)} == {tuple(point) for point in moved.round(9)}
     tips = np.stack([arrows.X + arrows.U, arrows.Y + arrows.V], axis=1)
@@ -82,7 +90,7 @@ def test_all_roots_side_by_side(wedge):
     for k, (ax, root, size) in enumerate(zip(figure.axes, roots, sizes, strict=True)):
         head, scale = ax.get_title().split("; displacements times ")
         assert head == f"root {k}: index {root.index:+d}"
-        assert 0.03 * body_shape(problem).size < float(scale) * size < 0.0801 * body_shape(problem).size
+        assert 0.03 * body_mesh(problem).size < float(scale) * size < 0.0801 * body_mesh(problem).size
     many = enumsol.enumerate_roots(enumsol.gallery.chain(3), 5.0).plot_bodies()
     assert len(many.axes) == 12
     assert "the first 12 of 27 roots" in many.get_suptitle()
@@ -92,11 +100,11 @@ def test_all_roots_side_by_side(wedge):
 def test_in_space():
     problem = enumsol.gallery.get("wedge3d-8-5").build()
     roots = enumsol.enumerate_roots(problem, 2.0)
-    shape = body_shape(problem)
+    mesh = body_mesh(problem)
     for root in roots:
         moves = problem.mesh.displacements(root.u)
-        np.testing.assert_allclose(shape.displacements(root.u), moves)
-        forces = shape.contact_forces(problem, root.lambda_n, root.lambda_t)
+        np.testing.assert_allclose(mesh.displacements(root.u), moves)
+        forces = contact_forces(problem, root.lambda_n, root.lambda_t)
         # forces on the whole body are in balance with load and stiffness: the work on any motion is that of the rows
         slips = np.stack([problem.Bt1 @ root.u, problem.Bt2 @ root.u], axis=1)
         work = root.lambda_n @ (problem.Bn @ root.u) + np.sum(root.lambda_t * slips)
@@ -209,7 +217,7 @@ def test_rounding_is_not_enlarged(problem):
     """What stays of a load that contact forces cancel is drawn as no displacement, beside moving bodies and alone."""
     roots = enumsol.enumerate_roots(problem, 3.5)
     for root in roots:
-        moves = body_shape(problem).moves(problem, root.u, root.alpha)
+        moves = body_moves(problem, root.u, root.alpha)
         assert np.array_equal(moves, np.zeros_like(moves)) == (np.max(np.abs(root.u)) < 1e-15), root
     still = [root for root in roots if np.max(np.abs(root.u)) < 1e-15]
     assert still
@@ -296,7 +304,7 @@ def test_prescribed_displacements_move_nodes_too():
     mesh = BodyMesh.of_dofs(points, [[0, 1, 2]], [0, 5], offset)
     assert mesh.displacements([2.0, 3.0]).tolist() == [[2, 0], [0.5, 0], [0, 3]]
     problem = enumsol.ContactProblem(np.eye(2), [[1, 0]], [[0, 1]], [1, 1], mesh=mesh)
-    assert body_shape(problem).displacements(np.array([2.0, 3.0])).tolist() == [[2, 0], [0.5, 0], [0, 3]]
+    assert body_mesh(problem).displacements(np.array([2.0, 3.0])).tolist() == [[2, 0], [0.5, 0], [0, 3]]
 
 
 # -- bodies in 3D ------------------------------------------------------------------------------------------------------
