@@ -438,7 +438,7 @@ def _by_displacements(scene: Scene, deck: Deck, used: Integers, found: Assembled
 
     These are along the thickness of plane stress, and of incompatible modes.
     """
-    d, known = scene.dimension, scene.joints.references
+    d, known = scene.dimension, scene.joints
     nodes, directions = np.array(found.names).T - 1
     own = (nodes >= 0) & (nodes < len(deck.points)) & (directions < d)
     rows = np.searchsorted(used, nodes) * d + directions

@@ -36,9 +36,9 @@ _ALONG = 1.0 - 1e-12
 _ON_A_LINE = 1e-9
 
 
-@dataclass(frozen=True)
-class References:
-    """Numbers of all displacements: components of nodes, then of reference points.
+@dataclass(eq=False)
+class Joints:
+    """Reference points and joints of a scene: numbers of all displacements, components of nodes, then of these points.
 
     Attributes
     ----------
@@ -46,14 +46,28 @@ class References:
         Of the nodes [length].
     places : mapping of names to (d,) arrays
         Of the reference points [length].
+    forces, slope : arrays
+        On reference points, and their derivatives with respect to alpha [force].
+    springs : csc_array
+        Stiffness of springs at nodes and reference points, of all displacements [force / length].
+    equations : list of Equation
+    said : list of str
+        What is joined, a line each.
+    notes : list of str
     """
 
     points: Floats
     places: Mapping[str, Floats]
+    forces: Floats
+    slope: Floats
+    springs: sp.csc_array
+    equations: list[Equation] = field(default_factory=list)
+    said: list[str] = field(default_factory=list)
+    notes: list[str] = field(default_factory=list)
 
     @classmethod
-    def of(cls, mesh: PartedMesh, given: object) -> References:
-        """Reference points by their names.
+    def of(cls, mesh: PartedMesh, given: object) -> Joints:
+        """Reference points by their names, which join nothing yet.
 
         Raises
         ------
@@ -67,7 +81,9 @@ class References:
                     f"reference {name} is called as a part of the mesh is; expected a name of its own"
                 )
             places[name] = short_vector(place, f"reference {name}", mesh.points.shape[1])
-        return cls(mesh.points, places)
+        more = len(places) * len(COMPONENTS[mesh.points.shape[1]])
+        count = mesh.points.size + more
+        return cls(mesh.points, places, np.zeros(more), np.zeros(more), sp.csc_array((count, count)))
 
     @property
     def dimension(self) -> int:
@@ -119,32 +135,6 @@ class References:
             return np.concatenate([moved, np.stack([-offset[:, 1], offset[:, 0]], axis=1)[:, :, None]], axis=2)
         return np.concatenate([moved, np.stack([np.cross(axis, offset) for axis in np.eye(3)], axis=2)], axis=2)
 
-
-@dataclass(frozen=True)
-class Joints:
-    """Joints of a scene, by the numbers of `References`.
-
-    Attributes
-    ----------
-    references : References
-    equations : list of Equation
-    forces, slope : arrays
-        On reference points, and their derivatives with respect to alpha [force].
-    springs : csc_array
-        Stiffness of springs at nodes and reference points, of all displacements [force / length].
-    said : list of str
-        What is joined, a line each.
-    notes : list of str
-    """
-
-    references: References
-    equations: list[Equation]
-    forces: Floats
-    slope: Floats
-    springs: sp.csc_array
-    said: list[str] = field(default_factory=list)
-    notes: list[str] = field(default_factory=list)
-
     @property
     def rows(self) -> sp.csr_array:
         """Equations as rows of length one, (k, m)."""
@@ -152,11 +142,11 @@ class Joints:
         starts = np.cumsum([0, *map(len, data)])
         columns = np.concatenate([np.zeros(0, dtype=np.int64), *(own.dofs for own in self.equations)])
         entries = (np.concatenate([np.zeros(0), *data]), columns, starts)
-        return sp.csr_array(entries, shape=(len(self.equations), self.references.count))
+        return sp.csr_array(entries, shape=(len(self.equations), self.count))
 
     def padded(self, K: sp.csc_array) -> sp.csc_array:
         """A matrix of the nodes, with zeros for reference points."""
-        return resized(K, self.references.count)
+        return resized(K, self.count)
 
 
 def resized(K: sp.csc_array, count: int) -> sp.csc_array:
@@ -175,11 +165,8 @@ def joints_of(body: NodalBasis, mesh: PartedMesh, options: Options, held: Suppor
         An option is not of its form or names what does not exist, nodes of a tie face nothing, or a coupling does not
         determine a rotation.
     """
-    known = References.of(mesh, options.reference)
-    found = Joints(
-        known, [], np.zeros(known.count - mesh.points.size), np.zeros(known.count - mesh.points.size),
-        _node_springs(mesh, known, options),
-    )  # fmt: skip
+    found = Joints.of(mesh, options.reference)
+    found.springs = _node_springs(mesh, found, options)
     _join_parts(body, mesh, options, found)
     for pair in options.tie:
         _tie(body, mesh, pair, found)
@@ -188,22 +175,21 @@ def joints_of(body: NodalBasis, mesh: PartedMesh, options: Options, held: Suppor
     for row, value in enumerate(options.equations):
         _equation(mesh, value, f"equations row {row}", held, found)
     for target, slope in ((found.forces, ""), (found.slope, "_slope")):
-        _push_references(options, known, target, slope)
+        _push_references(options, found, target, slope)
     _hold_unused(found)
     _settle(held, found)
     return found
 
 
 def _join_parts(body: NodalBasis, mesh: PartedMesh, options: Options, found: Joints) -> None:
-    known = found.references
     for what in ("rigid", "coupling"):
         for name, value in by_part(getattr(options, what), what).items():
-            dofs, parts = known.dofs(name), names_of(value, f"{what} of {name}")
+            dofs, parts = found.dofs(name), names_of(value, f"{what} of {name}")
             nodes = np.unique(np.concatenate([mesh.nodes(part) for part in parts]))
-            rigid = [1] if body.axisymmetric else [*range(known.each)]  # of a body of revolution along the axis
-            dofs, motions = dofs[rigid], known.motions(name, nodes)[:, :, rigid]
+            rigid = [1] if body.axisymmetric else [*range(found.each)]  # of a body of revolution along the axis
+            dofs, motions = dofs[rigid], found.motions(name, nodes)[:, :, rigid]
             if what == "rigid":
-                of_nodes = nodes[:, None] * known.dimension + np.arange(known.dimension)
+                of_nodes = nodes[:, None] * found.dimension + np.arange(found.dimension)
                 found.equations.extend(
                     Equation(np.append(of_nodes[k, i], dofs), np.append(1.0, -motions[k, i]), f"the rigid part {name}")
                     for k, i in np.ndindex(of_nodes.shape)
@@ -272,21 +258,20 @@ def _tie(body: NodalBasis, mesh: PartedMesh, value: Any, found: Joints) -> None:
 
 def _hold_references(options: Options, found: Joints) -> None:
     """Supports and given displacements of reference points."""
-    known = found.references
-    for name in (name for name in names_of(options.clamp, "clamp") if name in known.places):
-        found.equations.extend(Equation(known.dofs(name)[[k]], np.ones(1), f"clamp {name}") for k in range(known.each))
-    for name, given in displacements_of(options, known.dimension, known.places).items():
-        for component, (value, slope) in given.items() if name in known.places else ():
-            scale = 1.0 if component < known.dimension else known.length
-            own = Equation(known.dofs(name)[[component]], np.ones(1), f"displacement of {name}", value * scale)
+    for name in (name for name in names_of(options.clamp, "clamp") if name in found.places):
+        found.equations.extend(Equation(found.dofs(name)[[k]], np.ones(1), f"clamp {name}") for k in range(found.each))
+    for name, given in displacements_of(options, found.dimension, found.places).items():
+        for component, (value, slope) in given.items() if name in found.places else ():
+            scale = 1.0 if component < found.dimension else found.length
+            own = Equation(found.dofs(name)[[component]], np.ones(1), f"displacement of {name}", value * scale)
             found.equations.append(replace(own, slope=slope * scale))
 
 
 def _hold_along(mesh: PartedMesh, options: Options, held: Supports, found: Joints) -> None:
     """Displacements that are given along axes of nodes that are not x, y and z, by equations."""
     frames, d = frames_of(mesh, options.transform), mesh.points.shape[1]
-    for part, given in displacements_of(options, d, found.references.places).items():
-        if part in found.references.places:
+    for part, given in displacements_of(options, d, found.places).items():
+        if part in found.places:
             continue
         for node in mesh.nodes(part)[frames.own[mesh.nodes(part)]]:
             name = f"displacement of {part} at node {node}"
@@ -311,22 +296,21 @@ def _hold_unused(found: Joints) -> None:
     InvalidArgumentError
         A force or a moment acts on one, or a point is joined to nothing.
     """
-    known = found.references
     joining = [own for own in found.equations if len(own.dofs) > 1]
-    used = np.zeros(known.count, dtype=bool)
+    used = np.zeros(found.count, dtype=bool)
     for own in joining:
         used[own.dofs[own.coefficients != 0]] = True
-    for name in known.places:
-        dofs = known.dofs(name)
+    for name in found.places:
+        dofs = found.dofs(name)
         if not np.any(used[dofs]):
             raise InvalidArgumentError(
                 f"reference {name} is joined to no part; expected rigid or coupling for it, or equations that name it"
             )
         for dof in dofs[~used[dofs]]:
-            row = dof - known.points.size
+            row = dof - found.points.size
             if found.forces[row] or found.slope[row]:
                 raise InvalidArgumentError(
-                    f"a force or moment acts on {known.named(int(dof))}, which moves nothing; expected one that does"
+                    f"a force or moment acts on {found.named(int(dof))}, which moves nothing; expected one that does"
                 )
             found.equations.append(Equation(np.array([dof]), np.ones(1), f"what {name} moves"))
 
@@ -335,10 +319,10 @@ def _settle(held: Supports, found: Joints) -> None:
     """Hold the components of nodes to which equations leave nothing free, as supports do."""
     if not found.equations:
         return
-    more = np.zeros(found.references.count - held.fixed.size)
+    more = np.zeros(found.count - held.fixed.size)
     fixed = np.append(held.fixed, more > 0)
     values, slopes = np.append(held.values, more), np.append(held.slopes, more)
-    given = eliminated(fixed, values, slopes, found.equations, named=found.references.named)
+    given = eliminated(fixed, values, slopes, found.equations, named=found.named)
     lone = (np.diff(given.T.indptr) == 0)[: held.fixed.size].reshape(held.fixed.shape) & ~held.fixed
     for target, own in ((held.values, given.offset), (held.slopes, given.slope)):
         target[lone] = own[: held.fixed.size].reshape(held.fixed.shape)[lone]
@@ -352,7 +336,7 @@ def _equation(mesh: PartedMesh, value: object, name: str, held: Supports, found:
         raise InvalidArgumentError(
             f"{name} is {shown(value)}; expected terms, a list of [node, component, coefficient], and value or slope"
         )
-    dofs, coefficients = zip(*(_term(mesh, found.references, term, name) for term in entry["terms"]), strict=True)
+    dofs, coefficients = zip(*(_term(mesh, found, term, name) for term in entry["terms"]), strict=True)
     right, slope = (finite_number(entry.get(key, 0.0), f"{key} of {name}") for key in ("value", "slope"))
     if len(dofs) == 1 and dofs[0] < mesh.points.size:
         node, component = divmod(dofs[0], mesh.points.shape[1])
@@ -366,7 +350,7 @@ def _equation(mesh: PartedMesh, value: object, name: str, held: Supports, found:
 _KEYS = {"terms", "value", "slope"}
 
 
-def _term(mesh: PartedMesh, known: References, term: object, name: str) -> tuple[int, float]:
+def _term(mesh: PartedMesh, found: Joints, term: object, name: str) -> tuple[int, float]:
     """The number of a displacement, and its coefficient."""
     if not isinstance(term, (list, tuple)) or len(term) != 3:
         raise InvalidArgumentError(f"{name} has the term {shown(term)}; expected [node, component, coefficient]")
@@ -374,13 +358,13 @@ def _term(mesh: PartedMesh, known: References, term: object, name: str) -> tuple
     coefficient = finite_number(value, f"a coefficient of {name}")
     if coefficient == 0:
         raise InvalidArgumentError(f"{name} has the coefficient 0; expected another number")
-    names, d = COMPONENTS[known.dimension], known.dimension
-    of_point = isinstance(node, str) and node in known.places
+    names, d = COMPONENTS[found.dimension], found.dimension
+    of_point = isinstance(node, str) and node in found.places
     if component not in (own := names if of_point else names[:d]):
         raise InvalidArgumentError(f"{name} has the component {shown(component)}; expected one of {', '.join(own)}")
     k = names.index(component)
     if of_point:
-        return int(known.dofs(node)[k]), coefficient / (1.0 if k < d else known.length)
+        return int(found.dofs(node)[k]), coefficient / (1.0 if k < d else found.length)
     return d * _node(mesh, node, name) + k, coefficient
 
 
@@ -401,9 +385,9 @@ def _node(mesh: PartedMesh, node: object, name: str) -> int:
     return int(node)
 
 
-def _node_springs(mesh: PartedMesh, known: References, options: Options) -> sp.csc_array:
+def _node_springs(mesh: PartedMesh, found: Joints, options: Options) -> sp.csc_array:
     """Stiffness of springs from each node of a part to the ground, or between two nodes."""
-    frames, d = frames_of(mesh, options.transform), known.dimension
+    frames, d = frames_of(mesh, options.transform), found.dimension
     parts: list[tuple[Integers, Floats]] = []
 
     def add(dofs: Integers, K: NDArray[Any]) -> None:
@@ -412,10 +396,10 @@ def _node_springs(mesh: PartedMesh, known: References, options: Options) -> sp.c
     for name, value in by_part(options.node_spring, "node_spring").items():
         ends = name.split(":") if name not in mesh.facets and name not in mesh.node_sets else [name]
         what = f"node_spring of {name}"
-        stiffness = np.diag(_stiffness(value, what, known.each if name in known.places else d, len(ends) == 2))
-        if name in known.places:
-            turned = np.where(np.arange(known.each) < d, 1.0, known.length)
-            add(known.dofs(name), stiffness / turned / turned[:, None])
+        stiffness = np.diag(_stiffness(value, what, found.each if name in found.places else d, len(ends) == 2))
+        if name in found.places:
+            turned = np.where(np.arange(found.each) < d, 1.0, found.length)
+            add(found.dofs(name), stiffness / turned / turned[:, None])
         elif len(ends) == 2:
             one, two = (_node(mesh, end, what) for end in ends)
             if np.ndim(value) == 0:
@@ -429,7 +413,7 @@ def _node_springs(mesh: PartedMesh, known: References, options: Options) -> sp.c
         else:
             for node in mesh.nodes(name):
                 add(node * d + np.arange(d), frames.axes[node].T @ stiffness @ frames.axes[node])
-    return assembled(parts, known.count)
+    return assembled(parts, found.count)
 
 
 def _stiffness(value: Any, name: str, count: int, axial: bool) -> Floats:
@@ -440,13 +424,13 @@ def _stiffness(value: Any, name: str, count: int, axial: bool) -> Floats:
     return own
 
 
-def _push_references(options: Options, known: References, target: Floats, slope: str) -> None:
+def _push_references(options: Options, found: Joints, target: Floats, slope: str) -> None:
     """Forces and moments on reference points, added to ``target``."""
-    d = known.dimension
+    d = found.dimension
     for name, value in by_part(getattr(options, f"force{slope}"), f"force{slope}").items():
-        if name in known.places:
-            target[known.dofs(name)[:d] - known.points.size] += short_vector(value, f"force{slope} of {name}", d)
+        if name in found.places:
+            target[found.dofs(name)[:d] - found.points.size] += short_vector(value, f"force{slope} of {name}", d)
     for name, value in by_part(getattr(options, f"moment{slope}"), f"moment{slope}").items():
-        dofs, what = known.dofs(name)[d:] - known.points.size, f"moment{slope} of {name}"
+        dofs, what = found.dofs(name)[d:] - found.points.size, f"moment{slope} of {name}"
         one = [finite_number(value, what)] if d == 2 and np.ndim(value) == 0 else value
-        target[dofs] += short_vector(one, what, len(dofs)) / known.length
+        target[dofs] += short_vector(one, what, len(dofs)) / found.length

@@ -311,7 +311,7 @@ def _loaded_contact(scene: Scene) -> list[str]:
             if any(tuple(sorted(row)) in corners for row in scene.mesh.part(part).tolist()):
                 what = "stiffens" if option == "spring" else "acts on"
                 notes.append(f"{option} of {part} {what} contact nodes, as {part} is in contact")
-    touching, points = scene.contacts.rows.nodes, scene.joints.references.places
+    touching, points = scene.contacts.rows.nodes, scene.joints.places
     for option in ("force", "force_slope"):
         named = getattr(scene.options, option) or ()
         on = [part for part in named if part not in points and np.any(np.isin(scene.mesh.nodes(part), touching))]

@@ -208,10 +208,10 @@ class Scene:
             elastic = self.joints.padded(self.body.stiffness(self.material.elasticity))
         count = elastic.shape[0]
         forces, slope = (
-            np.concatenate([own.ravel(), other, np.zeros(count - self.joints.references.count)])
+            np.concatenate([own.ravel(), other, np.zeros(count - self.joints.count)])
             for own, other in ((self.forces, self.joints.forces), (self.slope, self.joints.slope))
         )
-        named = self.joints.references.named
+        named = self.joints.named
         problem = problem_of(
             Body(
                 sp.csc_array(elastic + resized(self.springs, count)),
@@ -401,7 +401,7 @@ def _parts(scene: Scene) -> list[str]:
 
 
 def _loads(scene: Scene) -> list[str]:
-    known = scene.joints.references
+    known = scene.joints
     every = [
         np.concatenate([own, more.reshape(-1, known.each)[:, : scene.dimension]])
         for own, more in ((scene.forces, scene.joints.forces), (scene.slope, scene.joints.slope))
