@@ -5,8 +5,10 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import TYPE_CHECKING, Literal
 
+import numpy as np
+
 from enumsol.decks.cards import key, target_of
-from enumsol.decks.model import ContactPair, Coupling, Interaction, NodalEquation, Spring, Transform
+from enumsol.decks.model import SYSTEMS, ContactPair, Coupling, Interaction, NodalEquation, Orientation, Spring
 from enumsol.decks.registry import card
 from enumsol.support.messages import counted
 
@@ -337,10 +339,10 @@ def spring(reading: Reading, given: Card) -> str:
 @card("TRANSFORM", "NSET", "TYPE")
 def transform(reading: Reading, given: Card) -> str:
     """*TRANSFORM: components of nodes along directions of their own."""
-    kind = given.choice("TYPE", ("", "R", "C"), "R or C") or "R"
+    system = SYSTEMS[given.choice("TYPE", ("", "R", "C"), "R or C")]
     if len(given.data) != 1:
         raise given.refused(f"has {len(given.data)} lines of data; expected six numbers")
-    numbers = tuple(given.numbers(0, 6, 6))
+    points = np.reshape(given.numbers(0, 6, 6), (2, 3))
     nodes = given.needed("NSET")
-    reading.deck.transforms.append(Transform(given.place, nodes, kind, numbers))
-    return f"components of {nodes} are {'cylindrical' if kind == 'C' else 'along axes of their own'}"
+    reading.deck.transforms.append(Orientation(system, points, np.zeros(3), None, given.place, nodes))
+    return f"components of {nodes} are {'cylindrical' if system == 'CYLINDRICAL' else 'along axes of their own'}"

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from enumsol.decks.cards import Card
-from enumsol.decks.model import Material, Orientation, Section
+from enumsol.decks.model import SYSTEMS, Material, Orientation, Section
 from enumsol.decks.registry import Reading, card
 from enumsol.support.array_types import Floats
 from enumsol.support.messages import counted
@@ -116,9 +116,9 @@ def other_section(reading: Reading, given: Card) -> str:
 def orientation(reading: Reading, given: Card) -> str:
     """*ORIENTATION: local directions, by two points and an origin."""
     name = given.needed("NAME")
-    system = given.name_of("SYSTEM") or "RECTANGULAR"
-    system = {"R": "RECTANGULAR", "C": "CYLINDRICAL"}.get(system, system)
-    if system not in ("RECTANGULAR", "CYLINDRICAL"):
+    named = given.name_of("SYSTEM")
+    system = SYSTEMS.get(named, named)
+    if system not in SYSTEMS.values():
         raise given.refused(f"has the system {system}, which is not read; expected RECTANGULAR or CYLINDRICAL")
     if not 1 <= len(given.data) <= 2:
         raise given.refused(f"has {len(given.data)} lines of data; expected two points, and a rotation")

@@ -237,27 +237,6 @@ class Spring:
     components: tuple[int, ...] = ()
 
 
-@dataclass(frozen=True)
-class Transform:
-    """Directions of the components of nodes.
-
-    Attributes
-    ----------
-    place : DeckPlace
-    nodes : str
-        The set of nodes.
-    kind : {"R", "C"}
-        Rectangular or cylindrical.
-    numbers : tuple of six float
-        Two points: on the first axis and in the plane of the first two, or on the axis of the cylinder.
-    """
-
-    place: DeckPlace
-    nodes: str
-    kind: str
-    numbers: tuple[float, ...]
-
-
 # -- nodes, elements, sets and materials -------------------------------------------------------------------------------
 
 
@@ -391,9 +370,13 @@ class Section:
     place: DeckPlace
 
 
+#: Systems of local directions by their letters; rectangular where a card gives none.
+SYSTEMS = {"": "RECTANGULAR", "R": "RECTANGULAR", "C": "CYLINDRICAL"}
+
+
 @dataclass(frozen=True, eq=False)
 class Orientation:
-    """Local directions of a material or of a section.
+    """Local directions of a material or a section, or those of the components of nodes (*TRANSFORM).
 
     Attributes
     ----------
@@ -405,6 +388,8 @@ class Orientation:
     rotation : (int, float) or None
         A local axis, 1 to 3, and degrees of an additional rotation about it.
     place : DeckPlace
+    nodes : str
+        The set of nodes whose components they turn, or "".
     """
 
     system: str
@@ -412,6 +397,7 @@ class Orientation:
     origin: Floats
     rotation: tuple[int, float] | None
     place: DeckPlace
+    nodes: str = ""
 
 
 @dataclass(eq=False)
@@ -613,7 +599,7 @@ class Deck:
     equations: list[NodalEquation] = field(default_factory=list)
     couplings: list[Coupling] = field(default_factory=list)
     springs: list[Spring] = field(default_factory=list)
-    transforms: list[Transform] = field(default_factory=list)
+    transforms: list[Orientation] = field(default_factory=list)
     account: list[Account] = field(default_factory=list)
 
     @cached_property

@@ -17,7 +17,7 @@ from enumsol.decks.model import by_block
 
 if TYPE_CHECKING:
     from enumsol.decks.cards import DeckPlace
-    from enumsol.decks.model import Coupling, Deck, ElementBlock, NodalEquation, Spring, Transform
+    from enumsol.decks.model import Coupling, Deck, ElementBlock, NodalEquation, Orientation, Spring
     from enumsol.decks.states import DeckState
     from enumsol.fem.deck_parts import DeckParts
     from enumsol.support.array_types import Integers
@@ -91,20 +91,19 @@ class DeckJoints:
     def _add(self, name: str, entry: Any) -> None:
         self.options.setdefault(name, []).append(entry)
 
-    def _transform(self, given: Transform) -> None:
+    def _transform(self, given: Orientation) -> None:
         rows = self.parts.in_bodies(self.deck.nodes_of(given.nodes, given.place))
-        numbers = list(given.numbers)
+        numbers, rectangular = given.points.ravel().tolist(), given.system == "RECTANGULAR"
         if self.dimension == 2:
-            along = np.array(numbers[3:]) - numbers[:3] if given.kind == "C" else np.array([0, 0, numbers[2]])
-            if np.any(along[:2]) or (given.kind == "R" and numbers[2]):
+            along = np.array([0, 0, numbers[2]]) if rectangular else given.points[1] - given.points[0]
+            if np.any(along[:2]) or (rectangular and numbers[2]):
                 raise given.place.refused(
                     "*TRANSFORM turns out of the plane of plane elements; expected axes within it"
                 )
             numbers = numbers[:2]
         if len(rows):
-            kind = "rectangular" if given.kind == "R" else "cylindrical"
             name = self.parts.nodes(rows, given.nodes)
-            self.options.setdefault("transform", {})[name] = {kind: numbers}
+            self.options.setdefault("transform", {})[name] = {given.system.lower(): numbers}
 
     def point(self, row: int) -> str:
         """Name of a reference point at a node."""
