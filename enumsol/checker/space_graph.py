@@ -90,7 +90,7 @@ class SpaceGraphChecker(GraphChecker):
             self._curve(given, record["curve"], records)
             record = self._cuts(given, next(records, None), records)
         self._compare()
-        if record != {"tree": True}:
+        if not same(record, {"tree": True}):
             raise RefusedError("the tree over alpha is missing")
         low, high = self.interval
         # conditions of leaves and curves are those within the bound of the rigid displacement

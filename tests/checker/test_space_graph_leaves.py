@@ -92,6 +92,13 @@ def test_a_curve_alone_says_nothing():
     assert "the tree breaks off" in why_refused(problem, records[:place])
 
 
+@pytest.mark.parametrize("begin", [{"tree": 1}, {"tree": 1.0}, {"tree": "true"}, {"tree": False}, {"tree": [True]}, {}])
+def test_a_tree_begins_with_true_itself(begin):
+    problem, records = leaf_by_leaf(*ROWS)
+    forged = replaced(records, records.index({"tree": True}), begin)
+    assert "the tree over alpha is missing" in why_refused(problem, forged)
+
+
 @pytest.mark.parametrize(
     ("name", "kind", "forged", "why"),
     [
