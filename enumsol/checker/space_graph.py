@@ -25,7 +25,7 @@ from enumsol.proof.leaves import Excluded, NoRoot, Unbalanced, UndecidedRecord
 from enumsol.proof.reading import RecordError, RefusedError, data_of, numbers_from, quoted, same, units_from
 from enumsol.proof.records import Limits, Tree
 from enumsol.trusted.space.curve_parts import CurveMotion, LinkParts, arcs_over, in_order, up_to_bound
-from enumsol.trusted.space.curve_runs import KnownCurve, apart, chain_of
+from enumsol.trusted.space.curve_runs import apart, chain_of
 from enumsol.trusted.space.pieces import AlphaPiece
 from enumsol.trusted.space.sector_rows import UNDECIDED, is_sector_covering
 from enumsol.trusted.space.solution_curve import AlphaProblem, only_curve
@@ -73,7 +73,7 @@ class SpaceGraphChecker(GraphChecker):
     arcs: int | None = 0
     gaps: list[tuple[Fraction, Fraction]] = field(default_factory=list)
     #: The curve of every box, and which one of its links it is; the piece of the cell that is looked at.
-    _boxes: list[tuple[KnownCurve, int]] = field(default_factory=list)
+    _boxes: list[tuple[CurveChain, int]] = field(default_factory=list)
     _over: AlphaPiece = field(init=False)
 
     def _report(self) -> GraphVerificationReport:
@@ -95,8 +95,7 @@ class SpaceGraphChecker(GraphChecker):
         low, high = self.interval
         # conditions of leaves and curves are those within the bound of the rigid displacement
         self.bounded = not self.problem.held
-        curves = [KnownCurve(given, chain) for chain in self.curves]
-        self._boxes = [(known, k) for known in curves for k in range(len(known.chain.links))]
+        self._boxes = [(chain, k) for chain in self.curves for k in range(len(chain.links))]
         self._over = AlphaPiece(AlphaSpace(enclosure, (low + high) / 2, units), low, high)
         self._walk(records, [TreeCell((UNDECIDED,) * self.problem.p, self.interval)])
         self.gaps += [gap for chain in self.curves for gap in chain.gaps]

@@ -23,11 +23,11 @@ if TYPE_CHECKING:
     from fractions import Fraction
 
     from enumsol.support.array_types import Codes, Floats
-    from enumsol.trusted.space.curve_runs import KnownCurve
+    from enumsol.trusted.space.curve_runs import CurveChain
     from enumsol.trusted.space.pieces import AlphaPiece
 
     #: Boxes of curves in the order in which they are numbered: the curve, and which one of its links it is.
-    Boxes = Sequence[tuple[KnownCurve, int]]
+    Boxes = Sequence[tuple[CurveChain, int]]
 
 
 @dataclass(frozen=True, eq=False)
@@ -159,7 +159,7 @@ class OnCurve(Record):
             return False
         if self.numbers is not None:
             return piece.lies_on(known, LinkRange(first, last), codes, self.numbers, errors)
-        curves = [link.curve for link in known.chain.links[first : last + 1]]
+        curves = [link.curve for link in known.links[first : last + 1]]
         return piece.holds_all(codes, known.problem, curves, errors)
 
 
@@ -209,8 +209,8 @@ class ThroughCurveBox(Record):
         arc, (at, root) = whole.arc(codes), whole.root_at(rational_from(self.alpha), self.leaf)
         if arc is None or root is None or not arc.has(root, self.leaf):
             return False
-        met = lies_in(at.place(root, known.problem), known.chain.links[number].curve)
-        return met and known.chain.runs_through(low, high)
+        met = lies_in(at.place(root, known.problem), known.links[number].curve)
+        return met and known.runs_through(low, high)
 
 
 def _boxes(entries: list[Any], limits: Limits) -> list[int]:

@@ -92,7 +92,7 @@ SHARED = {
     "trusted.space.solution_curve": None,
     "trusted.space.curve_parts": None,
     "trusted.space.curve_runs": {
-        *("CurveChain", "CurveLink", "CurveParts", "KnownCurve", "LinkRange", "apart", "goes_on", "link_between")
+        *("CurveChain", "CurveLink", "CurveParts", "LinkRange", "apart", "goes_on", "link_between")
     },
     "trusted.space.pieces": {"AlphaPiece", "LeafArc", "lie_along"},
     "trusted.space.space_uniqueness": {

@@ -17,10 +17,10 @@ from enumsol.condensation.space_condensed import AlphaSpace
 from enumsol.search.space.piece_proposals import ExaminedPiece, runs_over
 from enumsol.support.deadlines import Deadline
 from enumsol.trusted.space import curve_runs
-from enumsol.trusted.space.curve_runs import CurveParts, KnownCurve, LinkRange
+from enumsol.trusted.space.curve_runs import CurveParts, LinkRange
 from enumsol.trusted.space.pieces import AlphaPiece
 from enumsol.trusted.space.sector_rows import CONTACT, OPEN, STICK, UNDECIDED
-from enumsol.trusted.space.solution_curve import AlphaProblem, CurveBox, SolutionCurve
+from enumsol.trusted.space.solution_curve import CurveBox, SolutionCurve
 from enumsol.trusted.space.space_uniqueness import PieceWeights, how_far_off
 
 INTERVAL = Fraction(0), Fraction(1)
@@ -35,8 +35,7 @@ PIECES = [INTERVAL, (Fraction(1, 3), Fraction(2, 5)), (Fraction(5, 8), Fraction(
 def known_curves(p, seed):
     cover = ByCurves(random_over_alpha(p, seed), INTERVAL)
     cover.run(60, Deadline(), None, None)
-    given = AlphaProblem.of(cover.problem.enclosure)
-    return cover, [KnownCurve(given, chain) for chain in cover.chains]
+    return cover, cover.chains
 
 
 def piece_over(cover, low, high):
@@ -103,7 +102,7 @@ def test_parts_are_as_many_as_the_links_that_come_to_a_piece_ask_for(monkeypatch
     _, (known, *_) = known_curves(1, 1)
     low, high = PIECES[1]
     (run,) = runs_over(known, low, high)
-    whole = LinkRange(1, len(known.chain.links) - 1)
+    whole = LinkRange(1, len(known.links) - 1)
     assert run.first == run.last < whole.last
     several, one = known.over(whole, low, high), known.over(run, low, high)
     assert 64 <= len(one.links) < 128
@@ -154,7 +153,7 @@ def test_numbers_that_make_no_sense_are_refused():
     assert not piece.lies_on(known, run, codes, numbers[:-1])
     # another piece, no links, links in another order
     assert not piece_over(cover, low, Fraction(3, 2)).lies_on(known, run, codes, numbers)
-    count = len(known.chain.links)
+    count = len(known.links)
     for wrong in (LinkRange(-1, run.last), LinkRange(run.first, count), LinkRange(run.last + 1, run.last)):
         assert not piece.lies_on(known, wrong, codes, numbers)
 

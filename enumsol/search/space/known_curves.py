@@ -19,7 +19,6 @@ from enumsol.proof.curve_records import OnCurve, ThroughCurveBox
 from enumsol.proof.leaves import NoRoot
 from enumsol.search.space.curve_proposals import curve_point, placed, unplaced
 from enumsol.search.space.space_fathoming import without_sectors
-from enumsol.trusted.space.curve_runs import KnownCurve
 from enumsol.trusted.space.pieces import lie_along
 
 if TYPE_CHECKING:
@@ -79,7 +78,7 @@ class Curves:
 
     Attributes
     ----------
-    known : list of KnownCurve
+    known : list of CurveChain
     ends : list of (Fraction, Fraction)
         Ranges of alpha around the ends of curves, in their order.
     sampled : bool
@@ -95,7 +94,7 @@ class Curves:
         self._given, self.interval = given, interval
         self.sampled = self.final = False
         self.tried: set[tuple[Fraction, Fraction, Codes]] = set()
-        self.known: list[KnownCurve] = []
+        self.known: list[CurveChain] = []
         self.ends: list[Bounds] = []
         #: The curve of every box, numbered as in a proof.
         self._boxes: list[SolutionCurve] = []
@@ -107,7 +106,7 @@ class Curves:
         """Add a curve to those that are known."""
         self._boxes += [link.curve for link in chain.links]
         self._owner += [len(self.known)] * len(chain.links)
-        self.known.append(KnownCurve(self._given, chain))
+        self.known.append(chain)
         boxes = [curve.box for curve in self._boxes]
         self._c, self._d, self._e = (
             np.array([getattr(box, name) for box in boxes]) for name in ("centre", "direction", "border")
@@ -116,7 +115,7 @@ class Curves:
         self._h = np.array([box.half for box in boxes])
         # so near to the ends of curves nothing is searched
         room = Fraction(2.0**-14) * (self.interval[1] - self.interval[0])
-        ends = [end for curve in self.known for end in curve.chain.gaps]
+        ends = [end for curve in self.known for end in curve.gaps]
         whole = joined((low - room, high + room) for low, high in ends)
         self.ends = [(simplest(low, low + room / 2), simplest(high - room / 2, high)) for low, high in whole]
 
@@ -188,7 +187,7 @@ class Curves:
 
     def runs_through(self, number: int, piece: AlphaPiece) -> bool:
         """True if the curve of a box has no end over a piece."""
-        return self.known[self._owner[number]].chain.runs_through(piece.low, piece.high)
+        return self.known[self._owner[number]].runs_through(piece.low, piece.high)
 
 
 def middle_of(piece: AlphaPiece, root: SpaceRoot) -> Floats:
@@ -219,12 +218,12 @@ def beside(parts: CurveParts, codes: Codes, centre: Floats, angle: Floats | floa
     return there[np.all(np.abs(turned - angle) < radius, axis=1)]
 
 
-def points_on(arc: LeafArc, known: KnownCurve, parts: CurveParts, codes: Codes) -> list[tuple[Fraction, Codes]]:
+def points_on(arc: LeafArc, known: CurveChain, parts: CurveParts, codes: Codes) -> list[tuple[Fraction, Codes]]:
     """Points of a curve that seem to be on the arc of a leaf, as alphas and leaves of narrow sectors."""
     chosen, found = beside(parts, codes, arc.centre, arc.angle, arc.radius), []
     # in the middle of the parts, then at a quarter from their ends
     for k in [chosen[int(share * (len(chosen) - 1))] for share in (0.5, 0.25, 0.75)] if len(chosen) else []:
-        box = known.chain.links[parts.links[k]].curve.box
+        box = known.links[parts.links[k]].curve.box
         near = curve_point(known.problem, box.centre + parts.t.mid[k] * box.direction, box.border)
         if near is not None:
             found.append((Fraction(float(near.x[-1])), _narrow(known.problem, near.x, codes, _turning(codes))))
@@ -241,7 +240,7 @@ def _narrow(problem: AlphaProblem, x: Floats, codes: Codes, nodes: Sequence[int]
     return tuple(leaf)
 
 
-def around_curves(at: ExaminedPiece, codes: Codes, curves: Sequence[KnownCurve]) -> tuple[int, Sequence[int]] | None:
+def around_curves(at: ExaminedPiece, codes: Codes, curves: Sequence[CurveChain]) -> tuple[int, Sequence[int]] | None:
     """A node in a sector, and the part of that around the directions of known curves, then what is left of it."""
     nodes = [i for i, code in enumerate(codes) if code > SECTORS]
     towards = [parts.thetas[0][slides(parts, codes)][:, nodes] for _, parts in at.along(curves)]

@@ -27,7 +27,7 @@ from enumsol.search.space.space_fathoming import DefiniteForm
 from enumsol.search.space.space_newton import Isotropic
 from enumsol.search.space.space_search import SpaceSplitting, unbalanced
 from enumsol.search.splitting import ImposedRows
-from enumsol.trusted.space.curve_runs import CurveParts, KnownCurve, LinkRange
+from enumsol.trusted.space.curve_runs import CurveChain, CurveParts, LinkRange
 from enumsol.trusted.space.sector_rows import FORCE, FREE, GAP, OF_DISCS, TAU, Row, row_sign, sector_row_terms
 from enumsol.trusted.space.space_uniqueness import PieceWeights, equations, how_far_off
 
@@ -218,12 +218,12 @@ class Passage(NamedTuple):
     parts: CurveParts
 
 
-def runs_over(known: KnownCurve, low: Fraction, high: Fraction) -> list[LinkRange]:
+def runs_over(known: CurveChain, low: Fraction, high: Fraction) -> list[LinkRange]:
     """The runs of a curve that pass every alpha of a piece, each as short as may be."""
-    (first, last), count = known.joint_alphas, len(known.chain.links)
+    (first, last), count = known.joint_alphas, len(known.links)
     below, above = np.nextafter(float(low), -np.inf), np.nextafter(float(high), np.inf)
     sides = (first >= above).astype(int) - (last <= below)
-    sides = np.concatenate([sides[:-1], sides[:-1]]) if known.chain.closed else sides
+    sides = np.concatenate([sides[:-1], sides[:-1]]) if known.closed else sides
     beside = np.flatnonzero(sides)
     found = {LinkRange(int(j) % count, int(k - 1) % count) for j, k in pairwise(beside) if sides[j] == -sides[k]}
     return sorted(found)
@@ -264,17 +264,17 @@ class ExaminedPiece:
         return unbalanced(self.piece, (*self.piece.ends, self.piece.whole), codes)
 
     def along(
-        self, curves: Sequence[KnownCurve], piece: AlphaPiece | None = None
-    ) -> list[tuple[KnownCurve, CurveParts]]:
+        self, curves: Sequence[CurveChain], piece: AlphaPiece | None = None
+    ) -> list[tuple[CurveChain, CurveParts]]:
         """Known curves and their parts over the piece, or over a longer one."""
         piece = self.piece if piece is None else piece
         parts = self.parts.setdefault((piece.low, piece.high), [])
         for known in curves[len(parts) :]:
-            whole = LinkRange(0, len(known.chain.links) - 1)
+            whole = LinkRange(0, len(known.links) - 1)
             parts.append(known.over(whole, piece.low, piece.high))
         return list(zip(curves, parts, strict=True))
 
-    def ends_within(self, curves: Sequence[KnownCurve], statuses: tuple[int, ...]) -> bool:
+    def ends_within(self, curves: Sequence[CurveChain], statuses: tuple[int, ...]) -> bool:
         """True if in one run along the known curves, and in no other, these statuses hold over a part of a piece.
 
         Not where that run turns back and passes no alpha just once: with two solutions at one no form is definite.

@@ -392,7 +392,7 @@ class PieceTree:
         known, run = self.curves.known[passage.curve], passage.run
         numbers = at.numbers(statuses, passage.parts)
         if numbers is not None and piece.lies_on(known, run, statuses, numbers, THETA):
-            before = sum(len(other.chain.links) for other in self.curves.known[: passage.curve])
+            before = sum(len(other.links) for other in self.curves.known[: passage.curve])
             return OnCurve(before + run.first, before + run.last, numbers), []
         longer = self._is_longer(piece, _ALONE)
         if longer and at.is_hopeful(statuses, known.over(run, piece.middle, piece.middle)):

@@ -30,6 +30,8 @@ if TYPE_CHECKING:
 
 #: Bounds of alpha.
 Range = tuple[Fraction, Fraction]
+#: Parts of a run at least, and for every link that comes to the piece; into how many a part is cut at most; how often.
+_PARTS, _OF_LINK, _CUT, _CUTS = 64, 4, 64, 24
 
 
 @dataclass(frozen=True, eq=False)
@@ -166,6 +168,93 @@ class CurveChain:
         """True if solutions over [low, high] that are connected with a point in one of its boxes are all on it."""
         return all(end < low or begin > high for begin, end in self.gaps)
 
+    # -- its solutions over a piece of alpha -----------------------------------------------------------------------
+
+    @property
+    def problem(self) -> AlphaProblem:
+        """The problem whose solutions they are."""
+        return self.joints[0].problem
+
+    def places(self, run: LinkRange) -> NDArray[np.intp] | None:
+        """The links of a run; None where there are no such links."""
+        count, (first, last) = len(self.links), run
+        if not (0 <= first < count and 0 <= last < count) or (last < first and not self.closed):
+            return None
+        return np.arange(first, last + 1 + (count if last < first else 0)) % count
+
+    def passes(self, run: LinkRange, low: Fraction, high: Fraction) -> bool:
+        """True if a run passes every alpha of a piece: its ends lie on either side of it, or at its ends."""
+        if self.places(run) is None:
+            return False
+        start, end = self.joints[run.first].alphas, self.joints[run.last + 1].alphas
+        return (start[1] <= low and high <= end[0]) or (end[1] <= low and high <= start[0])
+
+    @cached_property
+    def _links(self) -> _Links:
+        found = []
+        with np.errstate(all="ignore"):
+            for link in self.links:
+                curve, near, radius = link.curve, link.curve.found.near, link.curve.found.spread[0]
+                begin, end = (float(link.start.mid - link.start.rad * SAFE), float(link.end.mid + link.end.rad * SAFE))
+                t = 0.5 * (begin + end), 0.5 * (end - begin) * SAFE + 4 * UNIT * (abs(begin) + abs(end))
+                m, wide = self.problem.m, upper_product(near.moves.size, radius) * SAFE
+                z, along, rho = near.z[:m], near.zd[:m], self.problem.rho * curve.box.rho
+                numbers = z.mid, z.rad, along.mid, along.rad, wide[:m], rho
+                found.append((*t, curve.box.centre[m], near.d[m], radius[m], *numbers))
+        t_mid, t_rad, alpha, rate, reach, *rest = map(np.array, zip(*found, strict=True))
+        z_mid, z_rad, slope, slope_rad, wides, steps = rest
+        return _Links(Ball(t_mid, t_rad), alpha, rate, reach, Ball(z_mid, z_rad), Ball(slope, slope_rad), wides, steps)
+
+    @cached_property
+    def joint_alphas(self) -> tuple[Array, Array]:
+        """Bounds of alpha at the points between two links, and at both ends."""
+        bounds = [joint.alphas for joint in self.joints]
+        low, high = (np.array([float(pair[k]) for pair in bounds]) for k in (0, 1))
+        return np.nextafter(low, -np.inf), np.nextafter(high, np.inf)
+
+    def over(self, run: LinkRange, low: Fraction, high: Fraction) -> CurveParts:
+        """The part of a run with alphas in a piece, in parts in its order; none where it does not come there."""
+        links, places = self._links, self.places(run)
+        assert places is not None
+        where, t, wanted = places, links.t[places], _PARTS
+        least, most = (float(np.nextafter(float(x), y)) for x, y in ((low, -np.inf), (high, np.inf)))
+        for k in range(_CUTS):
+            alpha = self._alphas(where, t)
+            # what overflows is not known to be beyond the piece, and stays
+            beyond = (alpha.mid + alpha.rad * SAFE < least) | (alpha.mid - alpha.rad * SAFE > most)
+            where, t, alpha = where[~beyond], t[~beyond], alpha[~beyond]
+            wanted = wanted if k else max(_PARTS, _OF_LINK * len(where))
+            if len(where) >= wanted or not len(where):
+                break
+            # a power of two
+            count = min(1 << (-(-wanted // len(where)) - 1).bit_length(), _CUT)
+            shares = (2.0 * np.arange(count) + 1.0) / count - 1.0
+            mid = (t.mid[:, None] + shares * t.rad[:, None]).ravel()
+            # of the sum and of the product
+            rad = np.repeat(t.rad / count * SAFE + 2 * UNIT * (np.abs(t.mid) + t.rad), count)
+            t, where = Ball(mid, rad), np.repeat(where, count)
+        order = np.lexsort((t.mid, np.argsort(places)[np.searchsorted(np.sort(places), where)]))
+        where, t = where[order], t[order]
+        alpha = self._alphas(where, t)
+        # the solutions that are spoken of have their alphas in the piece
+        begin, end = np.maximum(alpha.mid - alpha.rad * SAFE, least), np.minimum(alpha.mid + alpha.rad * SAFE, most)
+        rounded = 2 * UNIT * (np.abs(begin) + np.abs(end))
+        alpha = Ball(0.5 * (begin + end), (0.5 * np.maximum(end - begin, 0.0) + rounded) * SAFE + TINY)
+        z = links.z[where] + t[:, None] * links.slope[where]
+        F = Ball.exact(self.problem.F0) + alpha[:, None] * Ball.exact(self.problem.F1)
+        z = Ball(z.mid, (z.rad + links.wide[where]) * SAFE)
+        return CurveParts(alpha, F, z, links.rho[where], self._rubs, where, t)
+
+    @cached_property
+    def _rubs(self) -> Flags:
+        p = self.problem.p
+        return np.array([[(1 + k) * p + i in t for k in (0, 1)] for i, t in enumerate(self.problem.tau)])
+
+    def _alphas(self, where: NDArray[np.intp], t: Ball) -> Ball:
+        links = self._links
+        alpha = Ball.exact(links.alpha[where]) + t * Ball.exact(links.rate[where])
+        return Ball(alpha.mid, (alpha.rad + links.reach[where]) * SAFE)
+
 
 def chain_of(
     problem: AlphaProblem, boxes: Sequence[CurveBox], points: Sequence[CurveBox], interval: Range
@@ -265,10 +354,6 @@ def _same(one: CurveBox, other: CurveBox) -> bool:
     """True if two boxes are given by the same numbers, so that they hold the same solution."""
     parts = ("centre", "direction", "border", "radius", "rho")
     return all(np.array_equal(getattr(one, part), getattr(other, part)) for part in parts)
-
-
-#: Parts of a run at least, and for every link that comes to the piece; into how many a part is cut at most; how often.
-_PARTS, _OF_LINK, _CUT, _CUTS = 64, 4, 64, 24
 
 
 class LinkRange(NamedTuple):
@@ -398,97 +483,3 @@ class _Links(NamedTuple):
     slope: Ball
     wide: Array
     rho: Array
-
-
-@dataclass(frozen=True, eq=False)
-class KnownCurve:
-    """A curve, whose links pass alphas.
-
-    Attributes
-    ----------
-    problem : AlphaProblem
-    chain : CurveChain
-    """
-
-    problem: AlphaProblem
-    chain: CurveChain
-
-    def places(self, run: LinkRange) -> NDArray[np.intp] | None:
-        """The links of a run; None where there are no such links."""
-        count, (first, last) = len(self.chain.links), run
-        if not (0 <= first < count and 0 <= last < count) or (last < first and not self.chain.closed):
-            return None
-        return np.arange(first, last + 1 + (count if last < first else 0)) % count
-
-    def passes(self, run: LinkRange, low: Fraction, high: Fraction) -> bool:
-        """True if a run passes every alpha of a piece: its ends lie on either side of it, or at its ends."""
-        if self.places(run) is None:
-            return False
-        start, end = self.chain.joints[run.first].alphas, self.chain.joints[run.last + 1].alphas
-        return (start[1] <= low and high <= end[0]) or (end[1] <= low and high <= start[0])
-
-    @cached_property
-    def _links(self) -> _Links:
-        found = []
-        with np.errstate(all="ignore"):
-            for link in self.chain.links:
-                curve, near, radius = link.curve, link.curve.found.near, link.curve.found.spread[0]
-                begin, end = (float(link.start.mid - link.start.rad * SAFE), float(link.end.mid + link.end.rad * SAFE))
-                t = 0.5 * (begin + end), 0.5 * (end - begin) * SAFE + 4 * UNIT * (abs(begin) + abs(end))
-                m, wide = self.problem.m, upper_product(near.moves.size, radius) * SAFE
-                z, along, rho = near.z[:m], near.zd[:m], self.problem.rho * curve.box.rho
-                numbers = z.mid, z.rad, along.mid, along.rad, wide[:m], rho
-                found.append((*t, curve.box.centre[m], near.d[m], radius[m], *numbers))
-        t_mid, t_rad, alpha, rate, reach, *rest = map(np.array, zip(*found, strict=True))
-        z_mid, z_rad, slope, slope_rad, wides, steps = rest
-        return _Links(Ball(t_mid, t_rad), alpha, rate, reach, Ball(z_mid, z_rad), Ball(slope, slope_rad), wides, steps)
-
-    @cached_property
-    def joint_alphas(self) -> tuple[Array, Array]:
-        """Bounds of alpha at the points between two links, and at both ends."""
-        bounds = [joint.alphas for joint in self.chain.joints]
-        low, high = (np.array([float(pair[k]) for pair in bounds]) for k in (0, 1))
-        return np.nextafter(low, -np.inf), np.nextafter(high, np.inf)
-
-    def over(self, run: LinkRange, low: Fraction, high: Fraction) -> CurveParts:
-        """The part of a run with alphas in a piece, in parts in its order; none where it does not come there."""
-        links, places = self._links, self.places(run)
-        assert places is not None
-        where, t, wanted = places, links.t[places], _PARTS
-        least, most = (float(np.nextafter(float(x), y)) for x, y in ((low, -np.inf), (high, np.inf)))
-        for k in range(_CUTS):
-            alpha = self._alphas(where, t)
-            # what overflows is not known to be beyond the piece, and stays
-            beyond = (alpha.mid + alpha.rad * SAFE < least) | (alpha.mid - alpha.rad * SAFE > most)
-            where, t, alpha = where[~beyond], t[~beyond], alpha[~beyond]
-            wanted = wanted if k else max(_PARTS, _OF_LINK * len(where))
-            if len(where) >= wanted or not len(where):
-                break
-            # a power of two
-            count = min(1 << (-(-wanted // len(where)) - 1).bit_length(), _CUT)
-            shares = (2.0 * np.arange(count) + 1.0) / count - 1.0
-            mid = (t.mid[:, None] + shares * t.rad[:, None]).ravel()
-            # of the sum and of the product
-            rad = np.repeat(t.rad / count * SAFE + 2 * UNIT * (np.abs(t.mid) + t.rad), count)
-            t, where = Ball(mid, rad), np.repeat(where, count)
-        order = np.lexsort((t.mid, np.argsort(places)[np.searchsorted(np.sort(places), where)]))
-        where, t = where[order], t[order]
-        alpha = self._alphas(where, t)
-        # the solutions that are spoken of have their alphas in the piece
-        begin, end = np.maximum(alpha.mid - alpha.rad * SAFE, least), np.minimum(alpha.mid + alpha.rad * SAFE, most)
-        rounded = 2 * UNIT * (np.abs(begin) + np.abs(end))
-        alpha = Ball(0.5 * (begin + end), (0.5 * np.maximum(end - begin, 0.0) + rounded) * SAFE + TINY)
-        z = links.z[where] + t[:, None] * links.slope[where]
-        F = Ball.exact(self.problem.F0) + alpha[:, None] * Ball.exact(self.problem.F1)
-        z = Ball(z.mid, (z.rad + links.wide[where]) * SAFE)
-        return CurveParts(alpha, F, z, links.rho[where], self._rubs, where, t)
-
-    @cached_property
-    def _rubs(self) -> Flags:
-        p = self.problem.p
-        return np.array([[(1 + k) * p + i in t for k in (0, 1)] for i, t in enumerate(self.problem.tau)])
-
-    def _alphas(self, where: NDArray[np.intp], t: Ball) -> Ball:
-        links = self._links
-        alpha = Ball.exact(links.alpha[where]) + t * Ball.exact(links.rate[where])
-        return Ball(alpha.mid, (alpha.rad + links.reach[where]) * SAFE)

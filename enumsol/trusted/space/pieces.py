@@ -32,7 +32,7 @@ if TYPE_CHECKING:
 
     from enumsol.condensation.space_condensed import AlphaSpace, EnclosedSpace
     from enumsol.support.array_types import Codes, Floats
-    from enumsol.trusted.space.curve_runs import KnownCurve, LinkRange
+    from enumsol.trusted.space.curve_runs import CurveChain, LinkRange
     from enumsol.trusted.space.sector_rows import Row
     from enumsol.trusted.space.solution_curve import AlphaProblem, SolutionCurve
 
@@ -140,7 +140,7 @@ class AlphaPiece:
         return piece, found
 
     def lies_on(
-        self, known: KnownCurve, run: LinkRange, codes: Sequence[int], numbers: Floats, errors: float = 1.0
+        self, known: CurveChain, run: LinkRange, codes: Sequence[int], numbers: Floats, errors: float = 1.0
     ) -> bool:
         """True if all solutions with the statuses of an assignment, at every alpha of the piece, are those of a run.
 
