@@ -25,6 +25,14 @@ def projected(z, F):
     return out
 
 
+def around(z):
+    """All points of a ball, with an argument of F that stays."""
+    n = len(z.mid) + 1
+    nothing = np.zeros(n)
+    wide = Ball.exact(np.append(z.mid, 0.0)), Ball.exact(nothing), 0.0, Ball.exact(np.zeros((n, 0)))
+    return Extent(*wide, nothing[:0], np.append(z.rad, 0.0))
+
+
 def derivative(z, alpha, F0, F1):
     """Central differences, (M, M + 1)."""
     sides = [[projected(y[:M], F0 + y[M] * F1) for y in np.append(z, alpha) + step] for step in _STEPS]
@@ -49,7 +57,7 @@ def test_derivatives_lie_in_the_hull_of_their_box(seed):
         box = Ball(z, width * rng.uniform(0, 1, M))
         reach = 0.1 * width
         F = Ball(F0 + alpha * F1, np.abs(F1) * reach + 1e-15)
-        found = Discs(TAU, F, F1).corners(box)
+        found = Discs(TAU, F, F1).corners(around(box))
         if found is None:
             continue
         kinds += 1
@@ -76,7 +84,7 @@ def test_directions_of_a_narrow_box_are_bounded_to_first_order(seed):
     angle, wide = rng.uniform(0, 2 * np.pi), 1e-3
     z = np.array([1.0, 2 * np.cos(angle), 2 * np.sin(angle)])
     box = Ball(z, np.array([0.0, wide, wide]))
-    core = Discs(np.array([[1, 2]]), Ball.exact(np.ones(1))).corners(box).core
+    core = Discs(np.array([[1, 2]]), Ball.exact(np.ones(1)), np.zeros(1)).corners(around(box)).core
     most = np.sqrt(2) * wide / 2
     assert np.max(core.rad[1:, 0]) <= 1.01 * most
     # beta = 1 / |z_t| changes as well
@@ -101,7 +109,7 @@ def test_derivatives_of_nodes_that_slip_turn_as_their_rates_say(seed):
     half, radius, side = width, 0.3 * width * rng.uniform(0, 1, 5), 0.1 * width * rng.uniform(0, 1, M + 1)
     extent = Extent(Ball.exact(z), Ball.exact(along), half, Ball.exact(moves), radius, side)
     near = extent.near
-    found = Discs(TAU, Ball.exact(F0) + near[M] * Ball.exact(F1), F1).corners(near[:M], extent)
+    found = Discs(TAU, Ball.exact(F0) + near[M] * Ball.exact(F1), F1).corners(extent)
     turns, slipping = found.turns, [i for i in range(4) if i in found.turns.rows[:, 0]]
     assert slipping
     rest = found.still.rad + np.zeros((M, M + 1))
@@ -139,7 +147,7 @@ def test_bounds_of_what_turns_hold_in_exact_arithmetic(seed):
     along, moves = Ball.exact(rng.normal(size=M + 1)), Ball.exact(rng.normal(size=(M + 1, 5)))
     extent = Extent(z, along, half, moves, width * rng.uniform(0, 1, 5), np.zeros(M + 1))
     F0, F1, near = rng.uniform(0.1, 0.5, 4), rng.normal(size=4) * 0.1, extent.near
-    turns = Discs(TAU, Ball.exact(F0) + near[M] * Ball.exact(F1), F1).corners(near[:M], extent).turns
+    turns = Discs(TAU, Ball.exact(F0) + near[M] * Ball.exact(F1), F1).corners(extent).turns
     Y, Z, d = scale[0] * rng.normal(size=(3, M)), scale[1] * rng.normal(size=(M + 1, 2)), scale[2] * rng.normal(size=2)
     before, after = np.hstack([Y, np.zeros((3, 1))])[:, turns.rows], np.vstack([Z, np.zeros((1, 2))])[turns.columns]
     products = [
@@ -170,7 +178,7 @@ def test_a_ratio_whose_changes_cancel_is_known_to_second_order():
         np.zeros(4),
     )
     F = Ball.exact(np.ones(1)) + extent.near[3:]
-    turns = Discs(np.array([[1, 2]]), F, np.ones(1)).corners(extent.near[:3], extent).turns
+    turns = Discs(np.array([[1, 2]]), F, np.ones(1)).corners(extent).turns
     assert abs(turns.rates[0, 1]) <= 1e-15
     # by itself each of the two changes the ratio by 0.005
     assert turns.rest[0, 1] <= 4 * half**2
@@ -182,7 +190,7 @@ def test_tangents_around_zero_may_slip(middle):
     # P has the disc of radius 0.1 there, and z_t may be ten times as long, in all directions
     z = np.array([1.0, *middle])
     box = Ball(z, np.array([0.1, 1.0, 0.5]))
-    found = Discs(np.array([[1, 2]]), Ball.exact(np.full(1, 0.1)), np.zeros(1)).corners(box)
+    found = Discs(np.array([[1, 2]]), Ball.exact(np.full(1, 0.1)), np.zeros(1)).corners(around(box))
     # (12.11) where z_t = (1, 0) and (0, 0.5), and the identity
     for D in ([[1, 0, 0], [0.1, 0, 0], [0, 0, 0.1]], [[1, 0, 0], [0, 0.2, 0], [0.1, 0, 0]], np.eye(3)):
         assert np.all(np.abs(D - found.core.mid[:, :3]) <= found.core.rad[:, :3])
@@ -195,6 +203,6 @@ def test_tangents_around_zero_may_slip(middle):
 def test_one_tangent_around_zero_may_slip():
     box = Ball(np.array([1.0, 0.0]), np.array([0.0, 1.0]))
     for places in ([1, -1], [-1, 1]):
-        core = Discs(np.array([places]), Ball.exact(np.full(1, 0.1))).corners(box).core
+        core = Discs(np.array([places]), Ball.exact(np.full(1, 0.1)), np.zeros(1)).corners(around(box)).core
         for slip in (-0.1, 0.1):
-            assert np.all(np.abs([slip, 0.0] - core.mid[1]) <= core.rad[1])
+            assert np.all(np.abs([slip, 0.0] - core.mid[1, :2]) <= core.rad[1, :2])

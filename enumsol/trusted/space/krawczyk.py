@@ -189,7 +189,7 @@ class NaturalMap:
         None where its middle matrix is singular or there is no bound of derivatives.
         """
         m, n, near = len(self.y.mid), len(self.d), extent.near
-        corners = self.discs(near[m]).corners(near[:m], extent)
+        corners = self.discs(near[m]).corners(extent)
         if corners is None:
             return None
         B = self.part - corners.still @ self.moves

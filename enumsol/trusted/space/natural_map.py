@@ -37,14 +37,6 @@ class Extent:
     radius: Floats
     side: Floats
 
-    @classmethod
-    def around(cls, z: Ball) -> Self:
-        """All points of a ball."""
-        nothing = np.zeros(len(z.mid))
-        return cls(
-            Ball.exact(z.mid), Ball.exact(nothing), 0.0, Ball.exact(np.zeros((len(nothing), 0))), nothing[:0], z.rad
-        )
-
     @cached_property
     def near(self) -> Ball:
         """A ball of all these points."""
@@ -148,9 +140,7 @@ class Corners:
     def wide(self) -> Floats:
         """Bounds of what ``turns`` adds."""
         out, turns = np.zeros_like(self.still.rad), self.turns
-        there = (
-            (turns.rows >= 0)[:, :, None] & (turns.columns >= 0)[:, None, :] & (turns.columns < out.shape[1])[:, None]
-        )
+        there = (turns.rows >= 0)[:, :, None] & (turns.columns >= 0)[:, None, :]
         to = tuple(np.broadcast_to(x, there.shape)[there] for x in (turns.rows[:, :, None], turns.columns[:, None, :]))
         out[to] = turns.size[there]
         return out
@@ -168,15 +158,15 @@ class Discs:
         Places of the tau of every node in y, -1 where there is none.
     F : Ball of shape (p,)
         All that occur.
-    slope : (p,) array or None
-        The derivative of F with respect to the last argument; None where there is no such argument.
+    slope : (p,) array
+        The derivative of F with respect to the last argument.
     kept : int
         So many last components of y are kept as they are: rigid displacements (theory, section 14.14).
     """
 
     tau: Indices
     F: Ball
-    slope: Floats | None = None
+    slope: Floats
     kept: int = 0
 
     def projected(self, z: Ball) -> Ball:
@@ -207,31 +197,32 @@ class Discs:
         has = self.tau >= 0
         return Ball(np.where(has, z.mid[self.tau], 0.0), np.where(has, z.rad[self.tau], 0.0))
 
-    def corners(self, z: Ball, extent: Extent | None = None) -> Corners | None:
-        """All derivatives of P at points of a box, and their convex hull; None where there is no bound.
+    def corners(self, extent: Extent) -> Corners | None:
+        """All derivatives of P at points of a set, and their convex hull; None where there is no bound.
 
-        ``extent``: these points and the argument of F, if more is known than the box and ``F`` tell.
+        ``still`` has a column more than rows, for the derivative with respect to the argument of F.
 
-        ``still`` has a column more than rows, for the derivative with respect to the argument of F, if there is one.
+        Parameters
+        ----------
+        extent : Extent
+            The points, and of F the argument there.
         """
-        if not z.finite:
+        if not extent.near.finite:
             return None
-        m, width = len(z.mid), len(z.mid) + (self.slope is not None)
-        core = Ball(np.zeros((m, width)), np.zeros((m, width)))
-        nothing = Ball.exact(np.zeros(1))
-        found = _Blocks.of(Slips(self, Extent.around(Ball.joined(z, nothing)) if extent is None else extent))
+        slips = Slips(self, extent)
+        found = _Blocks.of(slips)
         if found is None:
             return None
+        rows, columns, m = slips.places[:, :3], slips.places, len(extent.near.mid) - 1
+        core = Ball(np.zeros((m, m + 1)), np.zeros((m, m + 1)))
         block, u, v = found.middle, found.u, found.v
         same = np.arange(m - self.kept, m)
         core.mid[same, same] = 1.0
-        rows = np.column_stack([np.arange(len(self.tau)), self.tau])
-        columns = rows if self.slope is None else np.column_stack([rows, np.full(len(rows), m)])
         there = (rows >= 0)[:, :, None] & (columns >= 0)[:, None, :]
         to = tuple(np.broadcast_to(x, there.shape)[there] for x in (rows[:, :, None], columns[:, None, :]))
-        core.mid[to], core.rad[to] = (part[:, :, : columns.shape[1]][there] for part in (block.mid, block.rad))
+        core.mid[to], core.rad[to] = (part[there] for part in (block.mid, block.rad))
         k = np.flatnonzero(found.paired)
-        U, V = np.zeros((m, len(k))), np.zeros((width, len(k)))
+        U, V = np.zeros((m, len(k))), np.zeros((m + 1, len(k)))
         for matrix, places, vectors in ((U, rows[k], u[k]), (V, columns[k], v[k])):
             number, part = np.nonzero(places >= 0)
             matrix[places[number, part], number] = vectors[number, part]
@@ -261,7 +252,7 @@ class Slips:
         self.z = extent.near
         last = len(self.z.mid) - 1
         self.places = np.column_stack([np.arange(p), discs.tau, np.full(p, last)])
-        self.change = np.zeros(p) if discs.slope is None else discs.slope
+        self.change = discs.slope
         tangent = discs.tangents(self.z)
         self.length, self.e, self.side = _middle(tangent)
         self.rows = self._rows()
@@ -363,7 +354,7 @@ class Slips:
 
 @dataclass(frozen=True)
 class _Blocks:
-    """Derivatives of P of every node, by (n, t1, t2) and the argument of F if there is one.
+    """Derivatives of P of every node, by (n, t1, t2) and the argument of F.
 
     To those that are ``paired``, t u v' with |t| <= 1/2 is to be added.
 
