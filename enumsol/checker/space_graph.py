@@ -88,7 +88,7 @@ class SpaceGraphChecker(GraphChecker):
         record = next(records, None)
         while isinstance(record, dict) and record.keys() == {"curve"}:
             self._curve(given, record["curve"], records)
-            record = self._cuts(given, next(records, None), records)
+            record = self._cuts(next(records, None), records)
         self._compare()
         if not same(record, {"tree": True}):
             raise RefusedError("the tree over alpha is missing")
@@ -199,14 +199,14 @@ class SpaceGraphChecker(GraphChecker):
             raise RefusedError(f"curve {number} is not proven to be one from end to end")
         self.curves.append(chain)
 
-    def _cuts(self, given: AlphaProblem, record: object, records: Iterator[Any]) -> Any:
+    def _cuts(self, record: object, records: Iterator[Any]) -> Any:
         """Read the arcs into which the last curve is cut, if its record says so; gives the record that follows."""
         if not same(record, {"parts": True}):
             self.arcs = None
             return record
         assert self.interval is not None
         chain = self.curves[-1]
-        parts = parts_of(given, chain, records, self._limits((UNDECIDED,) * self.problem.p))
+        parts = parts_of(chain, records, self._limits((UNDECIDED,) * self.problem.p))
         arcs, gaps = arcs_over(parts, self.interval, closed=chain.closed)
         self.arcs = None if self.arcs is None else self.arcs + arcs
         self.gaps += gaps
@@ -234,7 +234,7 @@ def _units_and_steps(
     return units, steps
 
 
-def parts_of(problem: AlphaProblem, chain: CurveChain, records: Iterator[Any], limits: Limits) -> list[Run | Turn]:
+def parts_of(chain: CurveChain, records: Iterator[Any], limits: Limits) -> list[Run | Turn]:
     """The runs and turns of a curve, each of them proven.
 
     Raises
@@ -243,7 +243,7 @@ def parts_of(problem: AlphaProblem, chain: CurveChain, records: Iterator[Any], l
         A record is no part, or does not prove what it says.
     """
     joined = zip(chain.links, chain.joints[:-1], chain.joints[1:], strict=True)
-    links = (up_to_bound(link, LinkCuts(problem, link, records, limits).parts(*ends)) for link, *ends in joined)
+    links = (up_to_bound(link, LinkCuts(link, records, limits).parts(*ends)) for link, *ends in joined)
     found = in_order(links, closed=chain.closed)
     if found is None:
         raise RefusedError("a curve changes its statuses where two of its boxes meet")
@@ -255,14 +255,13 @@ class LinkCuts(LinkParts):
 
     Parameters
     ----------
-    problem : AlphaProblem
     link : CurveLink
     records : iterator
     limits : of the problem
     """
 
-    def __init__(self, problem: AlphaProblem, link: CurveLink, records: Iterator[Any], limits: Limits) -> None:
-        super().__init__(problem, link)
+    def __init__(self, link: CurveLink, records: Iterator[Any], limits: Limits) -> None:
+        super().__init__(link)
         self._records, self._limits = records, limits
 
     def parts(self, start: SolutionCurve, end: SolutionCurve) -> list[Run | Turn]:
@@ -289,7 +288,7 @@ class LinkCuts(LinkParts):
                 raise RefusedError("the box of a part of a curve is not proven to hold it")
         if part.kind == "u":
             return [self.left_open(curve, start, end)]
-        motion = None if curve is None else CurveMotion(self.problem, curve)
+        motion = None if curve is None else CurveMotion(curve)
         changing: Sequence[int] = ()
         if codes is None and motion is not None:
             codes, changing = self.statuses(motion, start, end)
@@ -340,7 +339,7 @@ class LinkCuts(LinkParts):
             curve = self.curve_in(near.box, before, after)
             if curve is None:
                 raise RefusedError("the box between two places of a curve is not proven to hold them")
-            motion = CurveMotion(self.problem, curve)
+            motion = CurveMotion(curve)
         turn = self.corner(motion, *ends, (before, after)) if changing else None
         if turn is None:
             raise RefusedError("it is not proven that a curve changes its statuses between two places")

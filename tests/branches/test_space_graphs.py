@@ -449,7 +449,7 @@ def test_motion_is_that_of_differences(sliding):
     given, chain = sliding
     for joint in chain.joints:
         alpha, border = joint.at(0.0).mid[-1], np.array([0.0, 0.0, 0.0, 1.0])
-        speed = CurveMotion(given, joint, border).speed((SLIP,))
+        speed = CurveMotion(joint, border).speed((SLIP,))
         step = 1e-5
         there, here = (placed(given, np.append(sliding_node(a), a)) for a in (alpha + step, alpha - step))
         assert speed.mid[:3] * given.force == pytest.approx((there - here)[:3] / (2 * step), abs=1e-8)
@@ -468,13 +468,13 @@ def test_second_derivatives_are_those_of_differences(sliding, row):
     force = np.array([sliding_node(alpha + s)[1 + row] for s in steps])
     first = np.polyfit(force - force[1], steps, 2)
     border = border_of_zeta(given, border)
-    assert np.sign(first[0]) == CurveMotion(given, joint, border).bends((SLIP,))
-    assert CurveMotion(given, joint, border).speed((SLIP,)).mid[3] == pytest.approx(first[1], rel=1e-4)
+    assert np.sign(first[0]) == CurveMotion(joint, border).bends((SLIP,))
+    assert CurveMotion(joint, border).speed((SLIP,)).mid[3] == pytest.approx(first[1], rel=1e-4)
 
 
 def test_only_the_condition_between_two_statuses_decides(sliding):
-    given, chain = sliding
-    motion = CurveMotion(given, chain.links[0].curve)
+    _, chain = sliding
+    motion = CurveMotion(chain.links[0].curve)
     assert motion.possible == (frozenset({SLIP}),)
     # |z_t| - alpha z_n falls while alpha rises
     assert motion.decides((SLIP,), 0, STICK) in (0, -motion.rises((SLIP,)))
@@ -503,16 +503,16 @@ def test_counts_along_random_graphs_are_those_of_searches():
 
 
 def test_runs_and_turns_alternate(sliding):
-    given, chain = sliding
-    parts = runs_and_turns(given, chain)
+    _, chain = sliding
+    parts = runs_and_turns(chain)
     assert [type(part) for part in parts] == [Run]
     assert not any(isinstance(part, Turn) for part in parts)
     assert parts[0].index == 1
 
 
-def there_and_back(given, chain):
+def there_and_back(chain):
     """The parts of a chain that turns back once, which is settled: there is an arc of either index."""
-    parts = runs_and_turns(given, chain)
+    parts = runs_and_turns(chain)
     assert [type(part) for part in parts] == [Run, Turn, Run]
     assert parts[1].settled
     assert sorted((parts[0].index, parts[2].index)) == [-1, 1]
@@ -526,7 +526,7 @@ def test_both_nodes_of_a_symmetric_wedge_change_their_status_at_one_fold():
     root = enumsol.enumerate_roots(problem, 0.8485)[0]
     chain = chain_through(given, problem, np.append(forces(root), 0.8485), interval)
     assert chain.whole
-    _, turn, _ = there_and_back(given, chain)
+    _, turn, _ = there_and_back(chain)
     low, high = turn.alphas
     assert set(turn.selections) == {(SLIP, SLIP), (STICK, STICK)}
     assert high - low < 1e-8
@@ -563,7 +563,7 @@ def test_folds_of_one_node_are_those_of_the_closed_form(way):
     fold, given = way * node.alpha(phi), AlphaProblem.of(problem.enclosure)
     alpha, n, t = node.at(phi + 0.02)
     chain = chain_through(given, problem, np.array([n, *t, way * alpha]), around(fold, Fraction(1, 500)))
-    before, turn, after = there_and_back(given, chain)
+    before, turn, after = there_and_back(chain)
     low, high = turn.alphas
     assert turn.selections == ((SLIP,),)
     assert high - low < 1e-12
@@ -646,7 +646,7 @@ def fold_is_found(node, given, phi, way):
     chain = chain_through(given, node.problem, np.array([n, *t, alpha]), around(fold, 5 * abs(alpha - fold)))
     if chain is None or not chain.whole:
         return False
-    turns = [part for part in runs_and_turns(given, chain) if isinstance(part, Turn)]
+    turns = [part for part in runs_and_turns(chain) if isinstance(part, Turn)]
     if len(turns) != 1:
         # the curve ends before it turns, or turns again where the node loses contact
         return False

@@ -50,7 +50,6 @@ _ROUNDED = 16.0
 
 
 def runs_and_turns(
-    problem: AlphaProblem,
     chain: CurveChain,
     found: list[Run | Turn] | None = None,
     records: list[CurvePart] | None = None,
@@ -64,7 +63,7 @@ def runs_and_turns(
     for k, (link, start, end) in enumerate(zip(chain.links, chain.joints[:-1], chain.joints[1:], strict=True)):
         look()
         tell("boxes of a curve cut into arcs", k, len(chain.links))
-        cutter = LinkCutter(problem, link, nearness, records)
+        cutter = LinkCutter(link, nearness, records)
         _put(found, up_to_bound(link, cutter.parts(start, end)))
         nearness = cutter.nearness
     whole = in_order([found], closed=chain.closed)
@@ -93,7 +92,6 @@ class LinkCutter(LinkParts):
 
     Parameters
     ----------
-    problem : AlphaProblem
     link : CurveLink
     nearness : int
         Which of the distances from a change to the points beside it is tried first: then that of the last change.
@@ -101,14 +99,8 @@ class LinkCutter(LinkParts):
         Filled with the records of a proof, in the order of a walk.
     """
 
-    def __init__(
-        self,
-        problem: AlphaProblem,
-        link: CurveLink,
-        nearness: int = _TRIALS // 2,
-        records: list[CurvePart] | None = None,
-    ) -> None:
-        super().__init__(problem, link)
+    def __init__(self, link: CurveLink, nearness: int = _TRIALS // 2, records: list[CurvePart] | None = None) -> None:
+        super().__init__(link)
         self.nearness, self._open, self._records = nearness, 0, [] if records is None else records
         # a link is cut into so many parts at most: near the limit of sliding alpha hardly changes along a curve
         self._last = len(self._records) + 256
@@ -137,7 +129,7 @@ class LinkCutter(LinkParts):
         own = self._between(start, end) if curve is None else None
         curve = own if curve is None else curve
         if curve is not None:
-            motion = CurveMotion(self.problem, curve)
+            motion = CurveMotion(curve)
             changing: Sequence[int] = ()
             if codes is None:
                 codes, changing = self.statuses(motion, start, end)
@@ -200,7 +192,7 @@ class LinkCutter(LinkParts):
         if sides is None or sides[0].codes != one:
             return None
         near = self._between(*sides)
-        turn = self.corner(motion if near is None else CurveMotion(self.problem, near), start, end, sides)
+        turn = self.corner(motion if near is None else CurveMotion(near), start, end, sides)
         if turn is None:
             return None
         self._told("c", own, *sides, near=near)
@@ -272,11 +264,12 @@ class LinkCutter(LinkParts):
 
     def _between(self, start: Place, end: Place) -> SolutionCurve | None:
         """A curve in a box of its own that has two places of the link."""
-        return curve_between(self.problem, start, end, self.border)
+        return curve_between(start, end, self.border)
 
 
-def curve_between(problem: AlphaProblem, start: Place, end: Place, border: Array) -> SolutionCurve | None:
+def curve_between(start: Place, end: Place, border: Array) -> SolutionCurve | None:
     """A curve in a box of its own that has two places; None where none is proven to have them."""
+    problem = start.point.problem
     changing = [i for i, pair in enumerate(zip(start.codes, end.codes, strict=True)) if pair[0] != pair[1]]
     curve = curve_along(problem, (start.x, end.x), border, changing)
     if curve is None:

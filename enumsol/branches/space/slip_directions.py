@@ -149,13 +149,13 @@ class SlipDirections:
         # from its own point the arc goes on towards what lies behind the vertex
         if any(place.codes != self._values.codes or (over and place.rises <= 0) for place in own):
             return None
-        curve = curve_between(self._given, start, end, border)
+        curve = curve_between(start, end, border)
         return None if curve is None else (start, curve, end)
 
     def _place(self, x: Floats, border: Floats) -> Place | None:
         """A proven point of the curve near x."""
         found = proven_point(self._given, curve_point(self._given, x, border), border)
-        return None if found is None else Place(found, CurveMotion(self._given, found, border))
+        return None if found is None else Place(found, CurveMotion(found, border))
 
     def _shorter(self, part: _Part, k: int, low: float, high: float) -> SolutionCurve | None:
         """A curve within a part that has all of its solutions between two alphas; None where none is proven."""

@@ -249,7 +249,7 @@ class ByCurves:
                     found = self.begun.setdefault(k, [])
                     records: list[CurvePart] = []
                     found.clear()
-                    self.cuts[k] = runs_and_turns(self._given, chain, found, records), records
+                    self.cuts[k] = runs_and_turns(chain, found, records), records
             except TimeOverError:
                 cut = f"the time was over before curve {k + 1} of {len(curves)} was cut into arcs"
                 made.reasons.append(f"{cut}; {MORE_TIME}")

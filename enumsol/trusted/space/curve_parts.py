@@ -22,7 +22,6 @@ from enumsol.trusted.space.natural_map import Slips
 from enumsol.trusted.space.sector_rows import FRICTIONLESS, OPEN, STICK
 from enumsol.trusted.space.solution_curve import (
     SLIP,
-    AlphaProblem,
     CurveBox,
     SolutionCurve,
     lies_in,
@@ -44,15 +43,14 @@ class CurveMotion:
 
     Parameters
     ----------
-    problem : AlphaProblem
     curve : SolutionCurve
     border : (m + 1,) array, optional
         The row e of the parameter; that of the curve's box by default, and of another box that holds a point if the
         curve is a point.
     """
 
-    def __init__(self, problem: AlphaProblem, curve: SolutionCurve, border: Floats | None = None) -> None:
-        self.problem = problem
+    def __init__(self, curve: SolutionCurve, border: Floats | None = None) -> None:
+        problem = self.problem = curve.problem
         unit, box = problem.unit, curve.box
         self._border = (box.border if border is None else border) * unit
         near = map_around(problem, replace(box, rho=np.ones(problem.m)))
@@ -402,19 +400,17 @@ class LinkParts:
 
     Parameters
     ----------
-    problem : AlphaProblem
     link : CurveLink
     """
 
-    def __init__(self, problem: AlphaProblem, link: CurveLink) -> None:
-        self.problem, self.curve = problem, link.curve
-        self.border = link.curve.box.border
+    def __init__(self, link: CurveLink) -> None:
+        self.curve, self.problem, self.border = link.curve, link.curve.problem, link.curve.box.border
 
     # -- places and boxes ------------------------------------------------------------------------------------------
 
     def place(self, point: SolutionCurve) -> Place:
         """The place of a joint between two boxes."""
-        return Place(point, CurveMotion(self.problem, point, self.border))
+        return Place(point, CurveMotion(point, self.border))
 
     def place_at(self, point: SolutionCurve | None) -> Place | None:
         """At a point of the curve; None where it is not proven to be one at which all statuses hold strictly."""
