@@ -39,11 +39,10 @@ if TYPE_CHECKING:
 
     from enumsol.checker.walk import Test
     from enumsol.model.problem3d import ContactProblem3D
-    from enumsol.proof.curve_records import CurveBoxRecord
     from enumsol.proof.records import Record
     from enumsol.trusted.space.curve_parts import Place, Run, Turn
     from enumsol.trusted.space.curve_runs import CurveChain, CurveLink
-    from enumsol.trusted.space.solution_curve import SolutionCurve
+    from enumsol.trusted.space.solution_curve import CurveBox, SolutionCurve
 
     Array = NDArray[np.float64]
     Codes = tuple[int, ...]
@@ -189,10 +188,9 @@ class SpaceGraphChecker(GraphChecker):
         limits, found = self._limits((UNDECIDED,) * self.problem.p), []
         for _ in range(2 * count + 1):
             try:
-                said = box_from(next(records, None), limits)
+                found.append(box_from(next(records, None), limits))
             except ValueError as error:
                 raise RefusedError(f"curve {number} cannot be read: {error}") from None
-            found.append(said.box)
         assert self.interval is not None
         chain = chain_of(given, found[1::2], found[::2], self.interval)
         if chain is None:
@@ -283,7 +281,7 @@ class LinkCuts(LinkParts):
             raise RefusedError(f"a part of a curve cannot be read: {error}") from None
         own, *boxes = part.boxes
         if own is not None:
-            curve = self.curve_in(own.box, start, end)
+            curve = self.curve_in(own, start, end)
             if curve is None:
                 raise RefusedError("the box of a part of a curve is not proven to hold it")
         if part.kind == "u":
@@ -312,7 +310,7 @@ class LinkCuts(LinkParts):
         motion: CurveMotion,
         ends: tuple[Place, Place],
         codes: Codes | None,
-        boxes: Sequence[CurveBoxRecord | None],
+        boxes: Sequence[CurveBox | None],
     ) -> list[Run | Turn]:
         """A run, or two with a fold between them."""
         found: Sequence[Run | Turn | None] | None = None
@@ -330,13 +328,13 @@ class LinkCuts(LinkParts):
         motion: CurveMotion,
         ends: tuple[Place, Place],
         changing: Sequence[int],
-        boxes: Sequence[CurveBoxRecord | None],
+        boxes: Sequence[CurveBox | None],
         deepest: int,
     ) -> list[Run | Turn]:
         """A corner, with what is before and behind it."""
         before, after, near = self._place_in(boxes[0]), self._place_in(boxes[1]), boxes[2]
         if near is not None:
-            curve = self.curve_in(near.box, before, after)
+            curve = self.curve_in(near, before, after)
             if curve is None:
                 raise RefusedError("the box between two places of a curve is not proven to hold them")
             motion = CurveMotion(curve)
@@ -346,9 +344,9 @@ class LinkCuts(LinkParts):
         first = self._read(self.curve, ends[0], before, ends[0].codes, deepest - 1)
         return [*first, turn, *self._read(*self.behind(after, ends[1]), deepest - 1)]
 
-    def _place_in(self, record: CurveBoxRecord | None) -> Place:
+    def _place_in(self, box: CurveBox | None) -> Place:
         """A proven place of the curve."""
-        point = None if record is None else only_curve(self.problem, record.box)
+        point = None if box is None else only_curve(self.problem, box)
         place = self.place_at(point)
         if place is None:
             raise RefusedError("a place is not proven to be on its curve")

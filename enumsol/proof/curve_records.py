@@ -30,47 +30,29 @@ if TYPE_CHECKING:
     Boxes = Sequence[tuple[CurveChain, int]]
 
 
-@dataclass(frozen=True, eq=False)
-class CurveBoxRecord(Record):
-    """A box around a curve of solutions over alpha, or around a point of one.
+#: The first entry of a box around a curve of solutions over alpha, or around a point of one.
+BOX = "w"
 
-    Attributes
-    ----------
-    centre, direction, border, radius : (m + 1,) arrays, m = 3p, with rigid modes 3p + r
-    rho : (m,) array
-    half : float
-    """
 
-    kind, sizes = "w", (7,)
+def box_from(record: object, limits: Limits) -> CurveBox:
+    """A box; RecordError where it is none, or has not as many numbers as it must have."""
+    if not isinstance(record, list) or record[:1] != [BOX]:
+        raise RecordError(f"{quoted(record)} is no box")
+    if len(record) != 7:
+        raise RecordError(Record.unfit.format(len(record), 7))
+    m = 3 * limits.p + limits.modes
+    try:
+        centre, direction, border, radius = (numbers_from(part, m + 1) for part in record[1:5])
+        rho, (half,) = numbers_from(record[5], m), numbers_from(record[6:], 1)
+    except ValueError as error:
+        raise RecordError(f"a box around a curve cannot be read: {error}") from None
+    return CurveBox(centre, direction, border, float(half), radius, rho)
 
-    centre: Floats
-    direction: Floats
-    border: Floats
-    radius: Floats
-    rho: Floats
-    half: float
 
-    @classmethod
-    def of(cls, entries: list[Any], limits: Limits) -> CurveBoxRecord:
-        """The numbers; RecordError where there are not as many as there must be."""
-        try:
-            m = 3 * limits.p + limits.modes
-            c, d, e, radius = (numbers_from(part, m + 1) for part in entries[:4])
-            rho = numbers_from(entries[4], m)
-            (half,) = numbers_from([entries[5]], 1)
-        except ValueError as error:
-            raise RecordError(f"a box around a curve cannot be read: {error}") from None
-        return cls(c, d, e, radius, rho, float(half))
-
-    @classmethod
-    def around(cls, box: CurveBox) -> CurveBoxRecord:
-        """Record of a box."""
-        return cls(box.centre, box.direction, box.border, box.radius, box.rho, box.half)
-
-    @property
-    def box(self) -> CurveBox:
-        """Box of this record."""
-        return CurveBox(self.centre, self.direction, self.border, self.half, self.radius, self.rho)
+def box_record(box: CurveBox) -> list[Any]:
+    """The record that ``box_from`` reads."""
+    arrays = box.centre, box.direction, box.border, box.radius, box.rho
+    return [BOX, *(part.tolist() for part in arrays), box.half]
 
 
 #: Boxes of the kinds of parts: of the part itself, then of places and of what lies between them.
@@ -85,12 +67,12 @@ class CurvePart:
     ----------
     kind : of PARTS
         A run, a fold between two places, a change of statuses between two places, a middle place, or nothing is known.
-    boxes : of CurveBoxRecord, or None
+    boxes : of CurveBox, or None
         The part's own box first, None where one is known that holds it, or none is needed.
     """
 
     kind: str
-    boxes: tuple[CurveBoxRecord | None, ...]
+    boxes: tuple[CurveBox | None, ...]
 
     @classmethod
     def read(cls, record: Any, limits: Limits) -> CurvePart:
@@ -106,15 +88,7 @@ class CurvePart:
 
     def write(self) -> list[Any]:
         """The part as ``read`` takes it."""
-        return [self.kind, *(None if box is None else box.write() for box in self.boxes)]
-
-
-def box_from(record: object, limits: Limits) -> CurveBoxRecord:
-    """A box; RecordError where it is none."""
-    if not isinstance(record, list) or record[:1] != [CurveBoxRecord.kind]:
-        raise RecordError(f"{quoted(record)} is no box")
-    found: CurveBoxRecord = CurveBoxRecord.read(record, limits)
-    return found
+        return [self.kind, *(None if box is None else box_record(box) for box in self.boxes)]
 
 
 @dataclass(frozen=True, eq=False)

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from scipy.optimize import brentq
 
-from enumsol.proof.curve_records import CurveBoxRecord, CurvePart
+from enumsol.proof.curve_records import CurvePart
 from enumsol.search.space.curve_proposals import curve_along, curve_point, proven_point
 from enumsol.support.deadlines import look, tell
 from enumsol.trusted.space.curve_parts import (
@@ -112,7 +112,7 @@ class LinkCutter(LinkParts):
     def _told(self, kind: str, own: SolutionCurve | None, *places: Place, near: SolutionCurve | None = None) -> None:
         """Add a record of a part with a box of its own, if it has one, and these places."""
         curves = [own, *(place.point for place in places), *([near] if kind == "c" else [])]
-        boxes = (None if curve is None else CurveBoxRecord.around(curve.box) for curve in curves)
+        boxes = (None if curve is None else curve.box for curve in curves)
         self._records.append(CurvePart(kind, tuple(boxes)))
 
     def _cut(

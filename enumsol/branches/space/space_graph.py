@@ -19,7 +19,7 @@ from enumsol.branches.space.pieces import runs_and_turns
 from enumsol.branches.ways import Made
 from enumsol.condensation.enclosure import NotEnclosedError, enclosure_of
 from enumsol.model.sectors import SECTORS, is_sector, nearest, run_of
-from enumsol.proof.curve_records import CurveBoxRecord
+from enumsol.proof.curve_records import box_record
 from enumsol.proof.leaves import UndecidedRecord
 from enumsol.proof.records import CutPiece
 from enumsol.proof.writer import ProofWriter, unit_exponents
@@ -301,9 +301,9 @@ class ByCurves:
         for number, chain in enumerate(self.chains):
             writer.write({"curve": len(chain.links)})
             for k, joint in enumerate(chain.joints):
-                writer.write(CurveBoxRecord.around(joint.box).write())
+                writer.write(box_record(joint.box))
                 if k < len(chain.links):
-                    writer.write(CurveBoxRecord.around(chain.links[k].curve.box).write())
+                    writer.write(box_record(chain.links[k].curve.box))
             if arcs is not None:
                 parts, records = self.cuts[number]
                 writer.write({"parts": True})
