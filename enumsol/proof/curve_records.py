@@ -15,7 +15,6 @@ from enumsol.proof.reading import (
 )
 from enumsol.proof.records import Limits, Record, Tree
 from enumsol.trusted.space.curve_runs import LinkRange
-from enumsol.trusted.space.pieces import lies_in
 from enumsol.trusted.space.solution_curve import CurveBox
 
 if TYPE_CHECKING:
@@ -183,7 +182,8 @@ class ThroughCurveBox(Record):
         arc, (at, root) = whole.arc(codes), whole.root_at(rational_from(self.alpha), self.leaf)
         if arc is None or root is None or not arc.has(root, self.leaf):
             return False
-        met = lies_in(at.place(root, known.problem), known.links[number].curve)
+        place = at.place(root, known.problem)
+        met = place is not None and known.links[number].curve.holds(place)
         return met and known.runs_through(low, high)
 
 

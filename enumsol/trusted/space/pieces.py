@@ -234,36 +234,29 @@ class AlphaPiece:
         return Ball.joined(given.coordinates(Ball.joined(forces, q), Ball.joined(moved, still)), alpha[None])
 
 
-def lies_in(place: Ball | None, curve: SolutionCurve, errors: float = 1.0) -> bool:
-    """True if all solutions within bounds are on the curve of a box: they lie where it has the only ones.
-
-    ``errors``: 1 proves, a writer of proofs takes more.
-    """
-    return place is not None and curve.holds(place, 1.0 - (errors - 1.0) * MARGIN)
-
-
 def lie_along(ends: Sequence[Ball], curves: Sequence[SolutionCurve], errors: float = 1.0) -> bool:
     """True if all between two bounds, or within one, is on the curve of some boxes, in one box after the other.
 
     The sets in which curves are the only solutions are convex: what is between two bounds that lie in one does so, too.
+    ``errors``: 1 proves, a writer of proofs takes more.
     """
     if not curves:
         return False
-    low, high = ends[0], ends[-1]
-    if not lies_in(low, curves[0], errors):
+    low, high, room = ends[0], ends[-1], 1.0 - (errors - 1.0) * MARGIN
+    if not curves[0].holds(low, room):
         low, high = high, low
     place, share = low, 0.0
     for curve in curves[:-1]:
-        if not lies_in(place, curve, errors):
+        if not curve.holds(place, room):
             return False
         # as far as this box has all of it
         step = 1.0 - share
         for _ in range(_STEPS):
             step *= 0.5
             ahead = _between(low, high, share + step)
-            if lies_in(ahead, curve, errors):
+            if curve.holds(ahead, room):
                 place, share = ahead, share + step
-    return lies_in(place, curves[-1], errors) and lies_in(high, curves[-1], errors)
+    return curves[-1].holds(place, room) and curves[-1].holds(high, room)
 
 
 def _between(low: Ball, high: Ball, share: float) -> Ball:

@@ -416,7 +416,7 @@ def lies_in(box: CurveBox, x: Ball) -> bool:
     return bool(t.size <= box.half and np.all(beside.size <= box.radius))
 
 
-def only_curve(problem: AlphaProblem, box: CurveBox, errors: float = 1.0) -> SolutionCurve | None:
+def only_curve(problem: AlphaProblem, box: CurveBox) -> SolutionCurve | None:
     """The curve that the solutions in a box are, or None where that is not proven.
 
     Parameters
@@ -424,7 +424,6 @@ def only_curve(problem: AlphaProblem, box: CurveBox, errors: float = 1.0) -> Sol
     problem : AlphaProblem
     box : CurveBox
         With positive radii and steps, one for both components of tau of a node.
-    errors : 1 proves; a writer of proofs takes more, so that a checker comes to the same answer
     """
     arrays = (box.centre, box.direction, box.border, box.radius)
     if not all(array.shape == (problem.m + 1,) and np.all(np.isfinite(array)) for array in arrays):
@@ -435,7 +434,7 @@ def only_curve(problem: AlphaProblem, box: CurveBox, errors: float = 1.0) -> Sol
     if box.rho.shape != (problem.m,) or not are_steps(box.rho, problem.places):
         return None
     with np.errstate(all="ignore"):
-        found = map_around(problem, box).mapped(box.radius / problem.unit, errors)
+        found = map_around(problem, box).mapped(box.radius / problem.unit, 1.0)
         return None if found is None else curve_of(problem, box, found)
 
 
