@@ -167,7 +167,7 @@ WEAK = 2.0**-20
 
 
 def weakly_held(S: Floats, g: Floats, rows: RigidRows, stiffness: float = WEAK) -> tuple[Floats, ...]:
-    """S and g with weak springs in place of those that they have."""
+    """S and g with weak springs in place of those that they have; of a body that is held, they themselves."""
     G, h = rows.G.mid, rows.h.mid
     soft = G.T / stiffness
     S = S + soft @ G

@@ -98,7 +98,7 @@ class AlphaPoint:
 def _relaxed(space: AlphaSpace, alpha: Fraction) -> SpaceSystem:
     """The problem at one alpha, of a body that nothing holds on weak springs (theory, section 14.5)."""
     enclosed = EnclosedSpace.of_problem(space.enclosure, alpha, *space.units)
-    S, g = _held(enclosed)
+    S, g = weakly_held(enclosed.S, enclosed.g, enclosed.rows)
     return replace(SpaceSystem.in_middle(enclosed, space.units), S=S, g=g)
 
 
@@ -120,7 +120,7 @@ class PieceBounds:
         held, normals, slips = _columns(low, rows)
         discs = [np.r_[end.discs.mid, np.zeros(len(low.g) - len(low.tau))] for end in (low, high)]
         both = [held + disc[:, None] * normals for disc in discs]
-        (S, g_low), (_, g_high) = map(_held, (low, high))
+        (S, g_low), (_, g_high) = (weakly_held(end.S, end.g, end.rows) for end in (low, high))
         lower = np.linalg.cholesky(S)
         scaled = solve_triangular(lower, np.column_stack([g_low, g_high, *both]), lower=True, check_finite=False)
         g, A = scaled.T[:2], (scaled[:, 2 : 2 + n], scaled[:, 2 + n :])
@@ -191,15 +191,7 @@ def _columns(system: EnclosedSpace, rows: Sequence[Row]) -> tuple[Floats, Floats
         for i, coefficient in zip(*sector_row_terms(row, system.tau, size), strict=True):
             of_disc = i == row[1] and row[0] in OF_DISCS
             (normals if of_disc else columns)[i, k] += coefficient * units[i]
-    return columns[:size] - _held(system)[0] @ columns[size:], normals, columns[size:]
-
-
-def _held(system: EnclosedSpace) -> tuple[Floats, Floats]:
-    """S and g, of a body that nothing holds on weak springs."""
-    if system.held:
-        return system.S, system.g
-    S, g = weakly_held(system.S, system.g, system.rows)
-    return S, g
+    return columns[:size] - weakly_held(system.S, system.g, system.rows)[0] @ columns[size:], normals, columns[size:]
 
 
 # -- forms by which a known curve has all solutions --------------------------------------------------------------------
