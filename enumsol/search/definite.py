@@ -30,11 +30,12 @@ _LARGEST = 300
 #: Of the way to the border, where the length of a step is sought first, and for so many steps.
 _INSIDE, _SHARES = 0.9, 8
 #: Of the gap that a node has, what at first may serve for its slip; largest theta / F that Newton's method begins with.
-_SHARED, _CHOSEN = 0.5, 0.999
+SHARED, _CHOSEN = 0.5, 0.999
 #: Smallest eigenvalue, relative to H and the mean of the numbers, at which descent may end; and that is any use.
 _ENOUGH, _JUST = 5e-4, 1e-6
-#: Where no descent is tried; the same where squares count: on blocks worse ones were not mended.
-_HOPELESS, _HOPELESS_SQUARES = -4.0, -1.0
+#: Smallest eigenvalue with plain numbers, relative to S or H, below which no better ones are sought; the same where
+#: squares count: on blocks worse ones were not mended.
+HOPELESS, _HOPELESS_SQUARES = -4.0, -1.0
 #: Rounds, steps of each, and the weight of H in one by what lacked before it; after so many rounds in a row that each
 #: leave more than this share of what lacks there is no other.
 _ROUNDS, _EVALUATIONS, _ABOVE, _IN_VAIN, _SLOW = 16, 15, 1.05, 2, 0.9
@@ -82,7 +83,7 @@ class Nodes:
     def first(self) -> Floats:
         """A share for every node with friction; where it may be chosen, the least in size that is clearly allowed."""
         size = self.F * np.abs(self.slip)
-        least = 1.0 - np.minimum(_SHARED * self.gap, size) / np.where(size > 0, size, np.inf)
+        least = 1.0 - np.minimum(SHARED * self.gap, size) / np.where(size > 0, size, np.inf)
         chosen = np.sign(self.slip) * np.where(size > 0, least, 0.0)
         return np.where(np.isfinite(self.share), self.share, chosen)
 
@@ -261,7 +262,7 @@ class Descent:
             H is not positive definite; or so many rows are far from what descent mends.
         """
         mu, _, nu = self._parts
-        z, hopeless = np.zeros(nu.stop), _HOPELESS
+        z, hopeless = np.zeros(nu.stop), HOPELESS
         if self.spare is not None:
             # what mu begins with where squares count
             z[mu], hopeless = np.log(3.0), _HOPELESS_SQUARES
@@ -336,7 +337,7 @@ class Descent:
         """Theta, or zero where it is chosen; the side where it is; and what a gap gives there."""
         nodes, chosen = self.nodes, ~np.isfinite(self.nodes.share)
         side = np.where(chosen, np.sign(nodes.slip), 0.0)
-        give = _SHARED * nodes.gap / np.where(side != 0, np.abs(nodes.slip), np.inf)
+        give = SHARED * nodes.gap / np.where(side != 0, np.abs(nodes.slip), np.inf)
         return nodes.F * np.where(chosen, 0.0, nodes.share), side, give
 
     def _split(self, z: Floats) -> tuple[Floats, Floats, Floats, Floats, Floats]:
@@ -381,10 +382,10 @@ class Descent:
             values, modes = eigh(form, H, subset_by_index=[0, 0], check_finite=False)
         else:
             # of what is worse the factorization fails
-            L = np.linalg.cholesky(form - _HOPELESS * H)
+            L = np.linalg.cholesky(form - HOPELESS * H)
             inverse = LinearOperator(H.shape, lambda x: cho_solve((L, True), x, check_finite=False), dtype=float)
             start = np.random.default_rng(0).normal(size=len(H))
-            values, modes = eigsh(form, 1, H, sigma=_HOPELESS, OPinv=inverse, v0=start, tol=1e-3)
+            values, modes = eigsh(form, 1, H, sigma=HOPELESS, OPinv=inverse, v0=start, tol=1e-3)
         return float(values[0]), np.asarray(modes[:, 0])
 
     def _objective(self, z: Floats, weight: float) -> tuple[float, Floats]:

@@ -14,6 +14,7 @@ import numpy as np
 
 from enumsol.model.statuses import BACKWARD, FORWARD, OPEN, SLIP_MINUS, SLIP_PLUS, STICK, UNDECIDED
 from enumsol.proof.leaves import OnlyReference
+from enumsol.search.definite import SHARED
 from enumsol.search.nodes import TreeCloser
 from enumsol.support.deadlines import look
 from enumsol.trusted.at_alpha import solve_selection
@@ -134,8 +135,6 @@ class ReferenceCloser(TreeCloser):
 
 #: mu of all nodes where kappa is one, and factors of |G d|^2, that are tried.
 NUMBERS = tuple((mu, balance) for balance in (16.0, 1024.0) for mu in (1.0, 3.0, 10.0))
-#: Of the gap of an open node, what at first may serve for its slip.
-_SHARED = 0.5
 
 
 def reference_numbers(system: EnclosedSystem, selection: Codes) -> Iterator[tuple[Floats, float, float]]:
@@ -150,7 +149,7 @@ def reference_numbers(system: EnclosedSystem, selection: Codes) -> Iterator[tupl
         stuck = np.clip(force[1] / (F * force[0]), -1.0, 1.0)
         needed = np.where(w_t != 0, -w_n / np.abs(F * w_t), 1.0)
     for mu, balance in NUMBERS:
-        apart = np.sign(w_t) * np.maximum(0.0, 1.0 - _SHARED * mu * needed)
+        apart = np.sign(w_t) * np.maximum(0.0, 1.0 - SHARED * mu * needed)
         choices = [code == SLIP_PLUS, code == SLIP_MINUS, code == STICK]
         share = np.select(choices, [np.ones(p), -np.ones(p), stuck], apart)[own]
         yield np.concatenate([np.full(p, mu), np.ones(len(share)), np.zeros(len(share)), share]), balance, mu

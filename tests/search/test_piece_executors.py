@@ -24,8 +24,7 @@ def executors():
 @pytest.fixture
 def small_tasks(monkeypatch):
     """Threads search tasks of few nodes from the root of the tree on; processes would not see this."""
-    monkeypatch.setattr(piece_tree, "FIRST", 1)
-    monkeypatch.setattr(piece_tree, "NODES", 3)
+    monkeypatch.setattr(piece_tree, "NODES", 1)
     with ThreadPoolExecutor(1) as one, ThreadPoolExecutor(3) as three:
         yield one, three
 

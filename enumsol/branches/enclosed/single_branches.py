@@ -17,6 +17,7 @@ import numpy as np
 
 from enumsol.branches.enclosed.joining import EventPlaceKind, Joined, join
 from enumsol.proof.leaves import Excluded, OnlyReference, Unbalanced
+from enumsol.search.certifiers.protocol import ERRORS
 from enumsol.search.chains import Chains, Link, LoadedSystem, SelectionCurve
 from enumsol.search.interval_tree import EmptyLeaf, Subtree
 from enumsol.search.reduction import WeightSource
@@ -49,9 +50,8 @@ _VAIN, _NODES_FOR_ONE = 2, 16
 #: Pieces tried in vain after which none is halved any more: so many, and one for so many nodes. Trees of few nodes are
 #: fast, and where there are several solutions nothing comes of smaller pieces.
 _VAIN_TRIES = 3
-#: Bounds of errors are multiplied by the first, and the form must be definite by the second, so that a checker that
-#: rounds otherwise agrees.
-_ERRORS, _MARGIN = 2.0, 1e-9
+#: The form must be definite by this, so that a checker that rounds otherwise agrees.
+_MARGIN = 1e-9
 #: Of theta along an arc of a body that nothing holds, one after the other.
 _DEGREES = 1, 2, 4, 8
 #: Of a tree below an assignment that nothing else excludes.
@@ -238,7 +238,7 @@ class _Proposals:
         # if possible without the bound of the rigid displacement
         free = without_bound(system.at(low, high)).reach
         for degree in _DEGREES:
-            tried = ((one, branch_references(asked, one, _ERRORS)) for one in self._of_degree(degree))
+            tried = ((one, branch_references(asked, one, ERRORS)) for one in self._of_degree(degree))
             numbers, references = next(((one, found) for one, found in tried if found), (self._numbers[0], []))
             for reach in (free, system.reach) if references else ():
                 leaves = Cover(references, reach).leaves(unbalanced, partial(self._searched, piece))
@@ -271,7 +271,7 @@ class _Proposals:
         return Solvers(self._traced.problem, Fraction(alpha), "verified", SIGN_TOLERANCE, None).known_root
 
     def _only(self, asked: Sequence[tuple[ArcSelection, float, float]], numbers: PieceNumbers) -> list[bool]:
-        return only_roots(asked, numbers, _ERRORS, _MARGIN)
+        return only_roots(asked, numbers, ERRORS, _MARGIN)
 
     def _sought(self, link: Link, alpha: float) -> PieceNumbers | None:
         """Numbers that serve at one alpha."""

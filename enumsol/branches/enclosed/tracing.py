@@ -14,6 +14,7 @@ import numpy as np
 
 from enumsol.branches.enclosed.cutting import AlphaBox, ArcPart, ArcPartKind, Cutting, OpenCause, Trace, between
 from enumsol.branches.enclosed.zeros import zeros_of
+from enumsol.search.certifiers.protocol import ERRORS
 from enumsol.support.deadlines import TimeOverError, look
 from enumsol.trusted.arcs.over_parts import Expansion, OverInterval, expansions, over_parts
 
@@ -31,8 +32,6 @@ if TYPE_CHECKING:
     #: Gives a selection in balls of many digits, or None.
     Precise = Callable[[], PreciseSelection | None]
 
-#: Bounds of errors are multiplied by this, so that a checker that rounds otherwise agrees.
-ERRORS = 2.0
 #: Boxes are not cut below so many units in the last place of alpha, or in many digits below this share of the interval.
 _SMALLEST_UNITS, _SMALLEST_PRECISE = 64.0, 2.0**-60
 #: Boxes shorter than this share of the interval are traced in many digits.

@@ -39,6 +39,8 @@ if TYPE_CHECKING:
 
 #: The balls written into a proof are wider than those found by this factor, so that a checker's own balls fit in.
 WIDEN = 4.0
+#: Error bounds count so many times where a proof is written, so that a checker that rounds otherwise agrees.
+ERRORS = 2.0
 
 
 @dataclass(frozen=True)
@@ -299,7 +301,7 @@ FORM_ERRORS = 4.0
 
 def energy_margin(within: EnclosedSystem | EnclosedPiece) -> Margin:
     """Lower bounds on the energy, less twice the error bound (theory, sections 6.2 and 7.9)."""
-    plain = partial(exclusion_margin, within, errors=2.0)
+    plain = partial(exclusion_margin, within, errors=ERRORS)
     # the compiled margins know no rows of a body as a whole
     if not (within.ends[0] if isinstance(within, EnclosedPiece) else within).held:
         return plain

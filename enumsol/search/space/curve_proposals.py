@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from enumsol.arithmetic.balls import TINY, UNIT, Ball
+from enumsol.search.certifiers.protocol import ERRORS
 from enumsol.search.space.space_newton import projected
 from enumsol.trusted.space.solution_curve import CurveBox, curve_of, map_around
 
@@ -21,8 +22,6 @@ if TYPE_CHECKING:
     from enumsol.trusted.space.krawczyk import Contraction, NaturalMap, Step
     from enumsol.trusted.space.solution_curve import AlphaProblem, SolutionCurve
 
-#: What a writer of proofs asks for.
-ERRORS = 2.0
 #: How much more room the radii have than the curve seems to need, in the hope that this suffices for what the room
 #: itself adds; the least radius relative to the largest; and steps of Newton's method.
 _ROOMS, _LEAST, _STEPS = (1.2, 1.3, 1.5, 1.5, 1.5, 1.5, 1.5), 1e-3, 8

@@ -17,6 +17,7 @@ from enumsol.arithmetic.rationals import simplest
 from enumsol.model.sectors import DEEPEST, SECTORS, holding, level_of, parts_around, places, span, width_of
 from enumsol.proof.curve_records import OnCurve, ThroughCurveBox
 from enumsol.proof.leaves import NoRoot
+from enumsol.search.certifiers.protocol import ERRORS
 from enumsol.search.space.curve_proposals import curve_point, placed, unplaced
 from enumsol.search.space.space_fathoming import without_sectors
 from enumsol.trusted.space.pieces import lie_along
@@ -169,7 +170,7 @@ class Curves:
             # a few rows of boxes of one curve, the shortest first, and no longer ones
             for first, last in sorted(runs, key=lambda run: run[1] - run[0])[:4]:
                 near = last - first < 64 and self._owner[first] == self._owner[last]
-                if near and lie_along(ends, self._boxes[first : last + 1], 2.0):
+                if near and lie_along(ends, self._boxes[first : last + 1], ERRORS):
                     return first, last
         return None
 

@@ -12,8 +12,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from enumsol.arithmetic.balls import nearly_singular
-from enumsol.search.space.curve_proposals import ERRORS
-from enumsol.search.space.space_fathoming import NEAR, Point
+from enumsol.search.certifiers.protocol import ERRORS
+from enumsol.search.reduction import NEAR
+from enumsol.search.space.space_fathoming import Point
 from enumsol.search.space.space_newton import Isotropic
 from enumsol.trusted.space.boxed_solution import Box, BoxedSolution, BoxProblem, is_inside, solution_in_box
 from enumsol.trusted.space.leaf_equations import with_free_bounds
@@ -218,7 +219,7 @@ def box_around(system: EnclosedSpace, y: Floats) -> Box | None:
             near = problem.around(centre)
             radius = np.full(len(y), _FIRST * float(np.max(np.abs(problem.g.mid) / np.diagonal(problem.S.mid))))
             for _ in range(_HALVINGS):
-                if near.mapped(radius, 2.0) is not None:
+                if near.mapped(radius, ERRORS) is not None:
                     return Box.of(system, centre / system.unit, radius / system.unit, rho)
                 radius *= 0.5
     return None

@@ -21,8 +21,8 @@ from enumsol.condensation.space_condensed import EnclosedSpace, SpaceSystem
 from enumsol.model.statuses import UNDECIDED
 from enumsol.proof.leaves import Excluded
 from enumsol.relaxation.space_relaxation import SpaceEngine
+from enumsol.search.certifiers.protocol import ERRORS
 from enumsol.search.setup import weakly_held
-from enumsol.search.space.curve_proposals import ERRORS
 from enumsol.search.space.space_fathoming import DefiniteForm
 from enumsol.search.space.space_newton import Isotropic
 from enumsol.search.space.space_search import SpaceSplitting, unbalanced

@@ -12,16 +12,16 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from enumsol.arithmetic.rationals import simplest
-from enumsol.condensation.space_condensed import AlphaSpace
+from enumsol.condensation.space_condensed import KEPT, AlphaSpace
 from enumsol.model.sectors import DEEPEST, SECTORS, level_of, width_level
 from enumsol.model.statuses import CONTACT, UNDECIDED
 from enumsol.proof.curve_records import OnCurve
 from enumsol.proof.leaves import Excluded
 from enumsol.proof.records import Branching, CutPiece
 from enumsol.relaxation.engine import PRUNE_MARGIN
+from enumsol.search.certifiers.protocol import ERRORS
 from enumsol.search.outcome import StopReason
 from enumsol.search.parts import Answer, Spread
-from enumsol.search.space.curve_proposals import ERRORS
 from enumsol.search.space.known_curves import Curves, CurveWantedError, around_curves, middle_of, settled, through
 from enumsol.search.space.open_leaves import is_swept
 from enumsol.search.space.piece_proposals import THETA, AlphaPoint, ExaminedPiece, Passage, exclusion, runs_over
@@ -45,8 +45,6 @@ if TYPE_CHECKING:
     #: The record of a node, and its children.
     Done = tuple[Record | "OpenLeaf", list["PieceNode"]]
 
-#: Pieces, and points with their relaxations, that are kept.
-_KEPT = 256
 #: Pieces are cut down to this share of the interval where only their length stands in the way of a certificate.
 _ALONE = 2.0**-5
 #: Pieces are cut so often at most between two branchings where multipliers fail at their ends only.
@@ -54,7 +52,7 @@ _CUTS = 2
 #: Longer pieces are cut where statuses occur along one curve over a part of them.
 _SHORT = 2.0**-6
 #: Nodes that are examined before workers help, and those of a task of a worker.
-FIRST, NODES = 16, 16
+NODES = 16
 
 
 @dataclass(frozen=True)
@@ -159,8 +157,8 @@ class PieceTree:
         self.space = AlphaSpace(enclosure, sum(interval, Fraction(0)) / 2, units)
         self._most, self._tick = max_nodes, tick
         self._least = Fraction(smallest) * (interval[1] - interval[0])
-        self._examined = lru_cache(_KEPT)(lambda low, high: ExaminedPiece(AlphaPiece(self.space, low, high)))
-        self._point = lru_cache(_KEPT)(partial(AlphaPoint, self.space))
+        self._examined = lru_cache(KEPT)(lambda low, high: ExaminedPiece(AlphaPiece(self.space, low, high)))
+        self._point = lru_cache(KEPT)(partial(AlphaPoint, self.space))
         self.records: list[Record | OpenLeaf] = []
         self.nodes, self.covered, self.settled = 0, 0.0, False
         self.stopped: StopReason | None = None
@@ -490,7 +488,7 @@ class SpreadPieces(Spread):
         """Search the tree, until a limit is reached or a curve is wanted."""
         tree = self._pieces
         if self._stack is None:
-            tree.examine(tree.waiting, max(FIRST - tree.nodes, 0))
+            tree.examine(tree.waiting, max(NODES - tree.nodes, 0))
             if tree.wanted is not None or tree.stopped is not None or not tree.waiting:
                 return
             self._renew()

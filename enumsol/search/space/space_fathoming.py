@@ -15,7 +15,9 @@ import scipy.linalg
 from enumsol.arithmetic.balls import factor_above
 from enumsol.model.sectors import SECTORS
 from enumsol.model.statuses import CONTACT, OPEN, STICK, UNDECIDED
+from enumsol.search.definite import HOPELESS
 from enumsol.search.nodes import TreeCloser
+from enumsol.search.reduction import NEAR
 from enumsol.search.space.space_newton import Isotropic
 from enumsol.support.deadlines import look
 from enumsol.trusted.space.sector_rows import leaf_code
@@ -29,12 +31,8 @@ if TYPE_CHECKING:
     from enumsol.support.array_types import Codes, Floats, Mask
 
 
-#: A condition of a scaled problem within this of zero may hold as an equation; only what is tried rests on it.
-NEAR = 1e-9
 #: Level of the sectors in which a regular solution is sought.
 _LEVEL = 20
-#: Smallest eigenvalue of Q relative to S for plain numbers below which there is no hope of better ones.
-_HOPELESS = -4.0
 #: Slack and smallest eigenvalue that fast arithmetic asks for.
 _CLEAR = 1e-6
 
@@ -218,7 +216,7 @@ class Point:
         theta = np.where(opened[:, None], self.theta * np.maximum(need, 0.0)[:, None], self.theta)
         theta = np.where((tau >= 0) & ~self.wide[:, None], theta, 0.0)
         form = DefiniteForm(self.system, [theta], opened, self.wide.astype(np.float64), held=held)
-        found = form.best(enough, better=better, hopeless=_HOPELESS if self.slack > NEAR else -np.inf)
+        found = form.best(enough, better=better, hopeless=HOPELESS if self.slack > NEAR else -np.inf)
         if found is None:
             return None
         mu, kappa, nu = found
@@ -277,7 +275,7 @@ class DefiniteForm:
         self.reach = np.where(off > 0, np.sqrt(np.sum(self._rows**2, axis=(1, 2))), 0.0)
         self._pushes = (tau >= 0) & ~self._open[:, None]
 
-    def best(self, enough: float, *, better: bool, hopeless: float = _HOPELESS) -> tuple[Floats, Floats, Floats] | None:
+    def best(self, enough: float, *, better: bool, hopeless: float = HOPELESS) -> tuple[Floats, Floats, Floats] | None:
         """mu, kappa and nu for which the smallest eigenvalue relative to S is more than ``enough``, or None.
 
         Plain ones, or better ones if these are asked for and plain ones are not below ``hopeless``.

@@ -41,7 +41,7 @@ from enumsol.proof.writer import Recorder
 from enumsol.relaxation.convex_forms import SlipFormAscent
 from enumsol.relaxation.engine import PRUNE_MARGIN, Relaxation
 from enumsol.relaxation.space_relaxation import SpaceEngine, SpaceRelaxation
-from enumsol.search.certifiers.protocol import WIDEN, Bound, Certifier, Refine, UndecidedPart, Unrecorded
+from enumsol.search.certifiers.protocol import ERRORS, WIDEN, Bound, Certifier, Refine, UndecidedPart, Unrecorded
 from enumsol.search.nodes import Forms, TreeCloser
 from enumsol.search.outcome import HOLD
 from enumsol.search.setup import WEAK, SearchSetup, weakly_held
@@ -169,14 +169,14 @@ class SpaceExclusions:
         (theory, section 14.4).
         """
         excluded = Excluded(rows, values)
-        if len(rows) and excluded.holds(self.free, codes, 2.0):
+        if len(rows) and excluded.holds(self.free, codes, ERRORS):
             return excluded, False
         if self.system.held:
             return None
         if (without := self.unbalanced(codes)) is not None:
             return without, False
         told = not any(code in (UNDECIDED, CONTACT) for code in codes)
-        if (within or told) and len(rows) and excluded.holds(self.system, codes, 2.0):
+        if (within or told) and len(rows) and excluded.holds(self.system, codes, ERRORS):
             if told and settle(self.free, codes) is None:
                 return NoRoot(), False
             return excluded, True
@@ -262,7 +262,7 @@ class SpaceCertifier(Certifier):
                 self._leaf(found[0])
             return found is not None
         leaf = Excluded(rows, values)
-        if not leaf.holds(form, codes, 2.0):
+        if not leaf.holds(form, codes, ERRORS):
             return False
         by = self._back(form, lambda: DeclaredForm(self._whole, form.numbers, np.zeros(0)))
         self._leaf(replace(leaf, by=by))
@@ -346,7 +346,7 @@ class SpaceCertifier(Certifier):
         found: SpaceRoot | LooseSolution | None
         record = Alone(codes or (), numbers, NOWHERE)
         try:
-            found = record.holds(self.enclosed, self._whole, errors=2.0, near=normal)
+            found = record.holds(self.enclosed, self._whole, errors=ERRORS, near=normal)
         except NotEnclosedError:
             return None
         # forces that are known no better, relative to the largest one, are left to the tree
@@ -366,7 +366,7 @@ class SpaceCertifier(Certifier):
         leaf : codes of the leaf
         """
         record = Alone(leaf, numbers, NOWHERE)
-        found = record.holds(self.enclosed, codes, errors=2.0)
+        found = record.holds(self.enclosed, codes, errors=ERRORS)
         if found is None:
             return None
         self._leaf(replace(record, enclosure=self._ball(found)))
