@@ -38,8 +38,8 @@ UNIT = 2.0**-53
 SAFE = 1.0 + 2.0**-40
 #: Covers underflow in the products of scaled data (even where subnormal numbers are flushed to zero).
 TINY = 2.0**-960
-#: The same for the norms of such data.
-ROOT_TINY = 2.0**-480
+#: The same for the norms of such data, 2^-480.
+ROOT_TINY = float(np.sqrt(TINY))
 
 
 def gamma(k: int) -> float:

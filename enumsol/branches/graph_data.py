@@ -18,7 +18,7 @@ from enumsol.errors import InvalidArgumentError
 from enumsol.roots.root_set import ABOUT_STABILITY, by_axis
 from enumsol.support.arguments import alpha_value
 from enumsol.support.immutable import Immutable, Listed
-from enumsol.support.messages import counted, html_lines, html_table
+from enumsol.support.messages import PRINTED, counted, html_lines, html_table
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping, Sequence
@@ -259,8 +259,6 @@ class GraphData(Immutable):
 
 #: Verdicts of stability, in the order of legends.
 VERDICTS = ("does not run away", "runs away", "undecided")
-#: Branches that are printed one by one.
-_PRINTED_BRANCHES = 20
 
 
 def verdict_words(data: GraphData) -> tuple[str, ...]:
@@ -294,9 +292,9 @@ def about_stability(data: GraphData) -> str:
 
 def graph_text(data: GraphData) -> str:
     """Counts, a line a branch, and whether the graph is complete."""
-    lines = [*_heading(data), *(_branch_line(data, branch) for branch in data.branches[:_PRINTED_BRANCHES])]
-    if len(data.branches) > _PRINTED_BRANCHES:
-        lines.append(f"  ... {len(data.branches) - _PRINTED_BRANCHES} more branches")
+    lines = [*_heading(data), *(_branch_line(data, branch) for branch in data.branches[:PRINTED])]
+    if len(data.branches) > PRINTED:
+        lines.append(f"  ... {len(data.branches) - PRINTED} more branches")
     lines += [f"  {about_stability(data)}"] if data.verdicts is not None else []
     lines += _left_open(data)
     return "\n".join([*lines, data.closing_line])
@@ -313,9 +311,9 @@ def graph_html(data: GraphData) -> str:
             ", ".join(f"{v.alpha:.6g}" for v in branch.folds),
             *(() if data.verdicts is None else (branch_stability(data, branch),)),
         )
-        for branch in data.branches[:_PRINTED_BRANCHES]
+        for branch in data.branches[:PRINTED]
     ]
-    more = len(data.branches) - _PRINTED_BRANCHES
+    more = len(data.branches) - PRINTED
     heads = ("branch", "shape", "arcs", "alpha from", "to", "folds at")
     table = html_table(heads if data.verdicts is None else (*heads, "stability"), rows) if rows else ""
     closing = [*([f"... {more} more branches"] if more > 0 else []), *_left_open(data), data.closing_line]

@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from enumsol.arithmetic.balls import SAFE
 from enumsol.checker.history_checker import search_records
 from enumsol.checker.reports import StabilityVerificationReport
 from enumsol.checker.walk import ProofChecker
@@ -45,8 +46,6 @@ if TYPE_CHECKING:
     from enumsol.trusted.motions_of_body import Setting
 
 _END = object()
-#: Above rounding in a few operations.
-_ABOVE, _BELOW = 1 + 2.0**-40, 1 - 2.0**-40
 #: Certificates of one root: K(mu) is kept at the ends of all their ranges.
 _MOST_CERTIFICATES = 2_000
 
@@ -240,7 +239,7 @@ class StabilityChecker(ProofChecker):
         if growing.found(part.stiffness, part.motions) is None:
             self.fail(f"root {said.number}: no motion is proven to grow in the range that is named")
             return UNDECIDED, None
-        return RUNS_AWAY, (math.sqrt(growing.low) * _BELOW, math.sqrt(growing.high) * _ABOVE)
+        return RUNS_AWAY, (math.sqrt(growing.low) / SAFE, math.sqrt(growing.high) * SAFE)
 
     def _statuses(self, leaf: Located) -> tuple[list[int], Floats | None] | None:
         """Statuses that hold strictly, and in 3D bounds of lambda_t; None where they are not certain."""
@@ -274,11 +273,11 @@ def _within(pressure: float, axes: list[tuple[Ball, Ball]]) -> bool:
     """True if a force is surely less than friction, lambda_n at least ``pressure`` and F > 0 along these axes."""
     shares = []
     for F, force in axes:
-        least = (float(F.mid) - float(F.rad)) * _BELOW
+        least = (float(F.mid) - float(F.rad)) / SAFE
         if not least > 0:
             return False
         shares.append((abs(float(force.mid)) + float(force.rad)) / least)
-    return math.hypot(*shares) * _ABOVE < pressure * _BELOW
+    return math.hypot(*shares) * SAFE < pressure / SAFE
 
 
 def _something_may_grow(part: Setting, given: list[Growing | NoMotion]) -> str | None:

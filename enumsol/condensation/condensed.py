@@ -19,8 +19,9 @@ if TYPE_CHECKING:
 
 #: Units of force and length lie between 2^-900 and 2^900; products and quotients of two of them and proofs need that.
 UNIT_EXPONENT = 900
-#: Squares of friction coefficients, times contact forces, must not overflow.
-LARGEST_FRICTION = 1e100
+#: Friction coefficients, and given forces and slips beside those of the load: squares of them, times contact forces,
+#: must not overflow.
+LARGEST_NUMBER = 1e100
 #: How many roundings for every row of S, with a unit diagonal, its eigenvalues may be off by.
 _ROUNDINGS = 4
 #: Rigid displacements whose contact nodes move less, squared and relative to the largest, move none.
@@ -106,10 +107,10 @@ class ScaledSystem:
                 f"the load makes contact forces and displacements of size {np.min(units):.1e} to {np.max(units):.1e}, "
                 f"where float64 over- or underflows; expected data in other units"
             )
-        if np.max(system.F) > LARGEST_FRICTION:
+        if np.max(system.F) > LARGEST_NUMBER:
             raise InvalidProblemError(
                 f"a friction coefficient is {np.max(system.F):g}, where float64 overflows; expected at most "
-                f"{LARGEST_FRICTION:g}"
+                f"{LARGEST_NUMBER:g}"
             )
         return cls(S, g / size, system.F, factor * size, size / factor, cholesky)
 

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from enumsol.arithmetic.balls import SAFE, TINY, UNIT, Ball, gamma, nearest, upper_norm
-from enumsol.condensation.condensed import LARGEST_FRICTION, cholesky_factor, load_unit, node_units
+from enumsol.condensation.condensed import LARGEST_NUMBER, UNIT_EXPONENT, cholesky_factor, load_unit, node_units
 from enumsol.condensation.data import exactly_at
 from enumsol.condensation.enclosure import EnclosedSystem, NotEnclosedError, RigidRows, coefficients, of_compliance
 from enumsol.errors import InvalidProblemError
@@ -29,8 +29,8 @@ if TYPE_CHECKING:
 
 #: Coefficients between 2^-9 and 2^8 keep tau as it is: S loses no more than twice so many binary digits by them.
 _NEAR_ONE = 8
-#: Smaller coefficients than this, but for 0, would make tau overflow float64.
-LEAST_FRICTION = 2.0**-900
+#: Smaller coefficients than this, but for 0, would make tau overflow float64, as units beyond theirs would.
+LEAST_FRICTION = 2.0**-UNIT_EXPONENT
 #: Points of an interval whose data are kept, pieces of it, and relaxations there.
 KEPT = 256
 
@@ -153,7 +153,7 @@ class SpaceSystem(FrictionUnits):
 def _out_of_range(F: Floats) -> str | None:
     """Why coefficients are too small or too large for float64, or None."""
     for wrong, limit in (
-        (F[F > LARGEST_FRICTION], f"where float64 overflows; expected at most {LARGEST_FRICTION:g}"),
+        (F[F > LARGEST_NUMBER], f"where float64 overflows; expected at most {LARGEST_NUMBER:g}"),
         (F[(F > 0) & (F < LEAST_FRICTION)], f"where float64 underflows; expected 0, or at least {LEAST_FRICTION:.1e}"),
     ):
         if len(wrong):

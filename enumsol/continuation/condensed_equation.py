@@ -11,7 +11,7 @@ from types import MappingProxyType
 import numpy as np
 import scipy.sparse as sp
 
-from enumsol.continuation.scaled_equation import STATUS_TOLERANCE, ScaledEquation
+from enumsol.continuation.scaled_equation import ScaledEquation
 from enumsol.errors import InvalidArgumentError
 from enumsol.model.problem import ContactProblem
 from enumsol.model.statuses import (
@@ -23,6 +23,7 @@ from enumsol.model.statuses import (
     SLIP,
     SLIP_MINUS,
     SLIP_PLUS,
+    STATUS_TOLERANCE,
     STICK,
     RowKind,
     active_within,

@@ -10,7 +10,6 @@ import numpy as np
 
 from enumsol.continuation.path_data import PathData, PathStatus, PointKind, Tangent
 from enumsol.continuation.recorder import SAME_POINT, Landmarks, PathRecorder, points_of
-from enumsol.continuation.scaled_equation import STATUS_TOLERANCE
 from enumsol.continuation.transitions import (
     FORWARD_TOLERANCE,
     RATE_TOLERANCE,
@@ -29,6 +28,7 @@ from enumsol.continuation.transitions import (
     turning_point,
 )
 from enumsol.errors import InvalidArgumentError, TooLargeError
+from enumsol.model.statuses import STATUS_TOLERANCE
 from enumsol.search.outcome import Stop, StopReason
 from enumsol.support.deadlines import keeping, look
 from enumsol.support.messages import counted

@@ -15,8 +15,9 @@ from enumsol.continuation.scaled_equation import ParameterPath, SmoothPath
 from enumsol.errors import EnumsolError, InvalidArgumentError
 from enumsol.model.problem import ContactProblem, check_is_problem
 from enumsol.model.statuses import OPEN, SLIP, STICK
-from enumsol.roots.local_branch import SINGULAR_TOLERANCE, SelectionTangent
+from enumsol.roots.local_branch import SelectionTangent
 from enumsol.roots.root import Root
+from enumsol.selections.solution import RANK_TOLERANCE
 from enumsol.support.arguments import alpha_value, instance_of, positive_integer, positive_number, unbounded_interval
 from enumsol.support.array_arguments import real_array
 from enumsol.support.messages import counted
@@ -380,7 +381,7 @@ def _root_of_floats(
     ``isolated``: it is not known to belong to a continuum.
     """
     codes, active = equation.codes(x), equation.active(x)
-    index = equation.index(codes, x, SINGULAR_TOLERANCE) if isolated else 0
+    index = equation.index(codes, x, RANK_TOLERANCE) if isolated else 0
     regular = bool(index) and all(len(held) == 1 for held in active)
     (lambda_n, lambda_t), (u_n, u_t) = equation.split(equation.forces(x)), equation.split(equation.displacements(x))
     closed = np.array([code != OPEN for code in codes])

@@ -35,7 +35,7 @@ from enumsol.condensation.condensed import condensation_of, solved
 from enumsol.condensation.factorization import RHS_BLOCK
 from enumsol.errors import InvalidArgumentError
 from enumsol.model.problem import check_is_problem
-from enumsol.model.statuses import FRICTIONLESS, OPEN, contact_status, space_status
+from enumsol.model.statuses import FRICTIONLESS, OPEN, STATUS_TOLERANCE, contact_status, space_status
 from enumsol.roots.local_branch import LocalBranchTest, NodeSlips, coherent_orientation
 from enumsol.support.arguments import alpha_value, optional_callable
 from enumsol.support.array_arguments import real_array
@@ -238,11 +238,6 @@ def _coefficients(function: PathFunction, alpha: float, name: str, shape: tuple[
         return np.column_stack([value, value]) if len(shape) == 2 and value.shape == shape[:1] else value
 
     return _evaluate(spread, alpha, name, shape)
-
-
-#: A condition within this of zero counts as met with equality; forces and displacements are of size one after scaling,
-#: points are converged to about 1e-12.
-STATUS_TOLERANCE = 1e-9
 
 
 class ScaledEquation(ABC):

@@ -18,8 +18,9 @@ import numpy as np
 
 from enumsol.condensation.condensed import solved
 from enumsol.continuation.path_data import Tangent
-from enumsol.continuation.scaled_equation import STATUS_TOLERANCE, ScaledEquation
+from enumsol.continuation.scaled_equation import ScaledEquation
 from enumsol.errors import TooLargeError
+from enumsol.model.statuses import STATUS_TOLERANCE
 from enumsol.roots.local_branch import MAX_SELECTIONS
 from enumsol.support.array_types import Codes, Floats
 

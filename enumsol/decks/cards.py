@@ -25,6 +25,9 @@ T = TypeVar("T")
 
 #: Bytes of all files of a deck together: larger ones need several times as much memory when they are read.
 MOST_BYTES = 1_000_000_000
+#: Length of a direction may differ from one by this, and radii of the ends of an arc by this share, by rounding of the
+#: numbers in a deck.
+ROUNDED = 1e-3
 #: Bytes of a line; no program writes lines of more than some hundreds.
 LONGEST_LINE = 100_000
 #: Files that a deck may include, each time counted, and how deep they may be nested.

@@ -34,10 +34,13 @@ class Shape:
         return self.name.rstrip("0123456789")
 
 
-_TETRAHEDRON = ((0, 1, 2), (0, 3, 1), (1, 3, 2), (2, 3, 0))
-_WEDGE = ((0, 1, 2), (3, 5, 4), (0, 3, 4, 1), (1, 4, 5, 2), (2, 5, 3, 0))
-_PYRAMID = ((0, 1, 2, 3), (0, 4, 1), (1, 4, 2), (2, 4, 3), (3, 4, 0))
-_HEXAHEDRON = ((0, 1, 2, 3), (4, 7, 6, 5), (0, 4, 5, 1), (1, 5, 6, 2), (2, 6, 7, 3), (3, 7, 4, 0))
+#: Faces S1, S2, ... of solids by their corners, by the name of the shape.
+_FACES = {
+    "tetra": ((0, 1, 2), (0, 3, 1), (1, 3, 2), (2, 3, 0)),
+    "wedge": ((0, 1, 2), (3, 5, 4), (0, 3, 4, 1), (1, 4, 5, 2), (2, 5, 3, 0)),
+    "pyramid": ((0, 1, 2, 3), (0, 4, 1), (1, 4, 2), (2, 4, 3), (3, 4, 0)),
+    "hexahedron": ((0, 1, 2, 3), (4, 7, 6, 5), (0, 4, 5, 1), (1, 5, 6, 2), (2, 6, 7, 3), (3, 7, 4, 0)),
+}
 #: Edges of elements by pairs of corners, in the order of the nodes between them, by the name of the shape.
 EDGES = {
     "triangle": ((0, 1), (1, 2), (2, 0)),
@@ -52,8 +55,9 @@ EDGES = {
 }
 
 
-def _faces(name: str, faces: tuple[tuple[int, ...], ...], *, inside: bool = False) -> tuple[tuple[int, ...], ...]:
+def _faces(name: str, *, inside: bool = False) -> tuple[tuple[int, ...], ...]:
     """Faces of second order, from their corners."""
+    faces = _FACES[name]
     corners = max(node for face in faces for node in face) + 1
     between = {frozenset(edge): corners + k for k, edge in enumerate(EDGES[name])}
     found = [(*face, *(between[frozenset(edge)] for edge in pairwise((*face, face[0])))) for face in faces]
@@ -76,20 +80,20 @@ _SHAPES = {
         Shape("quad", 2, 4, 4, _sides(4, second=False)),
         Shape("quad8", 2, 8, 4, _sides(4, second=True)),
         Shape("quad9", 2, 9, 4, _sides(4, second=True)),
-        Shape("tetra", 3, 4, 4, _TETRAHEDRON),
-        Shape("tetra10", 3, 10, 4, _faces("tetra", _TETRAHEDRON)),
-        Shape("pyramid", 3, 5, 5, _PYRAMID),
-        Shape("pyramid13", 3, 13, 5, _faces("pyramid", _PYRAMID)),
-        Shape("wedge", 3, 6, 6, _WEDGE),
-        Shape("wedge15", 3, 15, 6, _faces("wedge", _WEDGE)),
-        Shape("hexahedron", 3, 8, 8, _HEXAHEDRON),
-        Shape("hexahedron20", 3, 20, 8, _faces("hexahedron", _HEXAHEDRON)),
+        Shape("tetra", 3, 4, 4, _FACES["tetra"]),
+        Shape("tetra10", 3, 10, 4, _faces("tetra")),
+        Shape("pyramid", 3, 5, 5, _FACES["pyramid"]),
+        Shape("pyramid13", 3, 13, 5, _faces("pyramid")),
+        Shape("wedge", 3, 6, 6, _FACES["wedge"]),
+        Shape("wedge15", 3, 15, 6, _faces("wedge")),
+        Shape("hexahedron", 3, 8, 8, _FACES["hexahedron"]),
+        Shape("hexahedron20", 3, 20, 8, _faces("hexahedron")),
         Shape(
             "hexahedron27",
             3,
             27,
             8,
-            _faces("hexahedron", _HEXAHEDRON, inside=True),
+            _faces("hexahedron", inside=True),
             (*range(20), 26, 24, 23, 25, 21, 22, 20),
         ),
     )

@@ -6,7 +6,7 @@ from functools import partial
 
 import numpy as np
 
-from enumsol.decks.cards import Card, is_number, key
+from enumsol.decks.cards import ROUNDED, Card, is_number, key
 from enumsol.decks.elements import element_type
 from enumsol.decks.model import DeckRegion, ElementBlock, Members, Numbers, RigidProfile, by_block
 from enumsol.decks.registry import Reading, card, harmless, refused
@@ -242,8 +242,6 @@ def end_instance(reading: Reading, given: Card) -> None:
 
 #: Nodes or elements that one line may make; no deck that is written by hand has more.
 _MOST = 5_000_000
-#: Radii of the ends of an arc may differ by this share, by rounding.
-_ROUND = 1e-3
 
 
 @mesh_card("NGEN", "NSET", "LINE", "SYSTEM")
@@ -277,7 +275,7 @@ def _arc(given: Card, row: int, ends: Floats, centre: Floats, normal: Floats, sh
     one, two = ends - centre
     radius, other = np.linalg.norm(one), np.linalg.norm(two)
     across = normal if np.any(normal) else np.cross(one, two)
-    if abs(radius - other) > _ROUND * radius or not np.any(across):
+    if abs(radius - other) > ROUNDED * radius or not np.any(across):
         raise given.refused(
             "has ends of an arc at different distances from its centre, or opposite; expected others", row
         )

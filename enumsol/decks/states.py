@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from enumsol.decks.cards import ROUNDED
 from enumsol.decks.model import FIELDS, by_block
 
 if TYPE_CHECKING:
@@ -23,8 +24,6 @@ if TYPE_CHECKING:
 #: What a value is given to: the card's kind, the number of a node or an element, and a component, a face or a label.
 Key = tuple[str, int | str, int | str]
 
-#: Length of a direction may differ from one by this, by rounding of its components in the deck.
-_ROUNDED = 1e-3
 #: What else than before a field may be given to a set.
 _OTHER_FIELDS = {"GRAV": "gravity in another direction", "CENTRIF": "CENTRIF about another axis"}
 
@@ -158,7 +157,7 @@ def _given_to(deck: Deck, act: Act) -> list[tuple[Key, float]]:
         return [((act.card, row, 0), act.values[0]) for row in rows]
     if act.label in FIELDS:
         length = float(np.linalg.norm(act.values[-3:]))
-        if abs(length - 1.0) > _ROUNDED:
+        if abs(length - 1.0) > ROUNDED:
             raise act.place.refused(
                 f"*DLOAD has {act.label} with a direction of length {length:g}, which programs read differently; "
                 "expected length one"

@@ -21,7 +21,7 @@ import scipy.sparse as sp
 from enumsol.errors import InvalidArgumentError
 from enumsol.fem import meshes
 from enumsol.fem.bases import FLAT, between_corners, facet_basis, isotropic, nodal_basis
-from enumsol.fem.meshes import SAME, unit_vectors, vectors_of_all
+from enumsol.fem.meshes import ROUNDING, SAME, unit_vectors, vectors_of_all
 from enumsol.fem.restrained import Body, Supports, axes_of, gathered, movable, problem_of
 from enumsol.model.cells import numbers_of_nodes
 from enumsol.model.mesh import BodyMesh
@@ -291,10 +291,6 @@ def contact_problem(
     return cast("ContactProblem", problem)
 
 
-#: Nodal integrals of normals below this share of the largest are rounding.
-_NO_PRESSURE = 1e-6
-
-
 def basis_contact_problem(
     basis: CellBasis,
     stiffness: ArrayLike | sp.sparray | sp.spmatrix,
@@ -458,7 +454,7 @@ def _touching(basis: CellBasis, facets: Integers, dofs: Integers) -> Integers:
 def _check_pressed(basis: CellBasis, facets: Integers, dofs: Integers, touching: Integers) -> None:
     """Refuse nodes that a uniform pressure pulls at, or does not act on."""
     shares = integrals_over(basis, facets, lambda v, _: v[0])[dofs[touching, 0]]
-    if np.min(shares) <= _NO_PRESSURE * np.max(shares):
+    if np.min(shares) <= ROUNDING * np.max(shares):
         raise InvalidArgumentError(
             f"a uniform pressure pulls at contact node {touching[np.argmin(shares)]} or does not act on it (as at the "
             "corners of ElementHexS2); expected elements whose facets it presses on at every node"
@@ -492,7 +488,7 @@ def outward_normal(v: DiscreteField, w: FormExtraParams) -> Any:
 def pressed(vectors: Floats, nodes: Integers) -> Floats:
     """Nodal normals (p, d), which must not vanish."""
     lengths = np.linalg.norm(vectors, axis=1)
-    if np.min(lengths) <= _NO_PRESSURE * np.max(lengths):
+    if np.min(lengths) <= ROUNDING * np.max(lengths):
         raise InvalidArgumentError(
             f"the normals around contact node {nodes[np.argmin(lengths)]} cancel; expected normals, or parts of the "
             "boundary without a fold"

@@ -12,7 +12,7 @@ import scipy.sparse as sp
 from enumsol.errors import InvalidArgumentError
 from enumsol.fem.assembly import pressed
 from enumsol.fem.conditions import Obstacle, names_of
-from enumsol.fem.meshes import SAME, unit_vectors
+from enumsol.fem.meshes import ROUNDING, SAME, unit_vectors
 from enumsol.fem.restrained import ContactRows, Supports, means_of_nodes, movable
 from enumsol.model.cells import KINDS, boundary_facets, by_kind, contact_nodes, facet_rows, lines_along, padded
 from enumsol.support.arguments import finite_number, shown
@@ -26,10 +26,6 @@ if TYPE_CHECKING:
     from enumsol.model.cells import CellKind
     from enumsol.support.array_types import Floats, Integers, Mask
 
-#: Cosine of the angle from which on a normal of the boundary points away from an obstacle, but for rounding.
-_BEHIND = -1e-6
-#: A point may lie beyond the edge of a facet by this share of the facet: at ends that meet, but for rounding.
-_BEYOND = 1e-6
 #: Shape functions below this are rounding at a node.
 _AT_NODE = 1e-10
 #: Newton's steps at most to a point of a facet; of plane triangles and straight edges the first is the last.
@@ -273,7 +269,7 @@ def _group(
         given = Obstacle.of(obstacle, mesh.points.shape[1])
         normals, gaps = given.normals_and_gaps(mesh.points[touching])
         own = np.nan_to_num(integrals[touching] / np.linalg.norm(integrals[touching], axis=1, keepdims=True))
-        if np.all(np.sum(own * normals, axis=1) < _BEHIND):
+        if np.all(np.sum(own * normals, axis=1) < -ROUNDING):
             raise InvalidArgumentError(
                 f"obstacle {given.kind} is behind the contact boundary, whose outward normals point away from it; "
                 f"expected {given.expected}"
@@ -483,7 +479,7 @@ class _Facets:
     def inside(self, places: Floats) -> Mask:
         """Which places of the reference belong to the facet, but for rounding."""
         sums = places.sum(axis=1) if self.kind.form == "triangle" else np.max(places, axis=1)
-        return np.asarray(np.all(places >= -_BEYOND, axis=1) & (sums <= 1 + _BEYOND))
+        return np.asarray(np.all(places >= -ROUNDING, axis=1) & (sums <= 1 + ROUNDING))
 
     @cached_property
     def centres(self) -> Floats:

@@ -14,6 +14,7 @@ import numpy as np
 from enumsol.decks.cards import is_number
 from enumsol.decks.faces import face_nodes
 from enumsol.decks.model import by_block
+from enumsol.fem.meshes import ROUNDING
 
 if TYPE_CHECKING:
     from enumsol.decks.cards import DeckPlace
@@ -21,9 +22,6 @@ if TYPE_CHECKING:
     from enumsol.decks.states import DeckState
     from enumsol.fem.deck_parts import DeckParts
     from enumsol.support.array_types import Integers
-
-#: Of a line between two nodes, other components below this share of the largest are rounding.
-_ALIGNED = 1e-6
 
 
 @dataclass(eq=False)
@@ -226,7 +224,7 @@ class DeckJoints:
         """Stiffnesses of a spring to a node of no body, which has to be held: along an axis."""
         if not isinstance(value, list):
             along = np.abs(self.deck.points[end] - self.deck.points[row])
-            if np.sum(along > _ALIGNED * np.max(along)) != 1 or np.argmax(along) >= self.dimension:
+            if np.sum(along > ROUNDING * np.max(along)) != 1 or np.argmax(along) >= self.dimension:
                 raise given.place.refused(
                     f"*SPRING joins node {self.deck.node_name(row)} to node {self.deck.node_name(end)}, which belongs "
                     "to no body, in a direction between the axes; expected one along an axis"

@@ -418,6 +418,9 @@ def _no_grid(found: str) -> InvalidArgumentError:
 #: Coordinates that differ by less than this share of the extent of a mesh are equal, gaps below it are none, and so is
 #: what is left of Newton's equation where a line meets a facet: much larger, nodes of a fine mesh would be one.
 SAME = 1e-9
+#: Components of directions, places in a facet and integrals of normals below this share of the largest are rounding of
+#: coordinates, of which files often have six digits.
+ROUNDING = 1e-6
 #: Largest coordinates of which areas and volumes are computed, by dimension.
 LARGEST_COORDINATE = {2: 1e150, 3: 1e100}
 

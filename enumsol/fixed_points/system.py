@@ -15,6 +15,7 @@ from scipy.linalg import block_diag, cho_solve, solve_triangular
 
 from enumsol.arithmetic.balls import UNIT
 from enumsol.condensation.condensed import (
+    LARGEST_NUMBER,
     CondensedProblem,
     cholesky_factor,
     condensation_of,
@@ -31,9 +32,6 @@ if TYPE_CHECKING:
     from enumsol.support.array_types import Alpha, AlphaLike, Floats
 
     Problem = ContactProblem | ContactProblem3D
-
-#: Most that coefficients may be, and given forces and slips, in units in which those of the load have size 1.
-_LARGEST = 1e100
 
 
 def checked_problem(value: object) -> Problem:
@@ -184,8 +182,8 @@ class ContactSystem:
             F = self.problem.coefficients(self.alpha, slip * self.length)
         else:
             F = self.problem.friction_at(self.alpha)[:, None]
-        if np.max(F) > _LARGEST:
-            raise InvalidArgumentError(f"friction is {np.max(F):g}; expected at most {_LARGEST:g} here")
+        if np.max(F) > LARGEST_NUMBER:
+            raise InvalidArgumentError(f"friction is {np.max(F):g}; expected at most {LARGEST_NUMBER:g} here")
         return F
 
     def slip(self, x: Floats) -> Floats:
@@ -242,9 +240,9 @@ class ContactSystem:
         """
         with np.errstate(over="ignore"):
             scaled = values / np.tile(unit, len(values) // self.p)
-        if np.any(np.abs(scaled) > _LARGEST):
+        if np.any(np.abs(scaled) > LARGEST_NUMBER):
             raise InvalidArgumentError(
-                f"{name} has the value {np.max(np.abs(values)):g}; expected at most {_LARGEST:g} times the load's"
+                f"{name} has the value {np.max(np.abs(values)):g}; expected at most {LARGEST_NUMBER:g} times the load's"
             )
         return np.asarray(scaled)
 

@@ -20,7 +20,7 @@ from enumsol.fixed_points.tresca_solvers import (
     TrescaReference,
     interior_point,
 )
-from enumsol.model.statuses import ContactStatus
+from enumsol.model.statuses import STATUS_TOLERANCE, ContactStatus
 from enumsol.support.arguments import one_of
 from enumsol.support.array_arguments import real_array
 from enumsol.support.immutable import Sealed, sealed
@@ -33,10 +33,6 @@ if TYPE_CHECKING:
 
     from enumsol.fixed_points.system import Problem
     from enumsol.support.array_types import Alpha, AlphaLike, ArrayLike, Floats
-
-
-#: For statuses: a force below this fraction of the largest is zero, and |tau| this close to its bound has reached it.
-STATUS_TOLERANCE = 1e-9
 
 
 @dataclass(frozen=True)

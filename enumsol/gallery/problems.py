@@ -520,19 +520,17 @@ def holding(springs: ArrayLike, dimension: int) -> Floats:
     return total
 
 
-#: A public test of the contact community: one contact, with friction 0.1.
-_COMPLIANCE = ((15.0, -1.0, -2.0), (-1.0, 14.0, 1.0), (-2.0, 1.0, 16.0))
-_FREE_DISPLACEMENT = (-1.0, 2.0, 3.0)
-
-
 def one_node_3d(
-    W: ArrayLike = _COMPLIANCE, q: ArrayLike = _FREE_DISPLACEMENT, friction: Friction = 0.1
+    W: ArrayLike = ((15.0, -1.0, -2.0), (-1.0, 14.0, 1.0), (-2.0, 1.0, 16.0)),
+    q: ArrayLike = (-1.0, 2.0, 3.0),
+    friction: Friction = 0.1,
 ) -> ContactProblem3D:
     """Contact node given by its compliance: u = W r + q with u_n >= 0, r_n >= 0, u_n r_n = 0, and friction against u_t.
 
     In (normal, first tangent, second tangent), with the signs of contact solvers: u_n is the opening, r_n the pressing
     force. Ours are lambda = r and w = -u, so that S = W and g = -q. No displacement of a body is known: A = [Bn; Bt1;
-    Bt2] = W and f = -q give these numbers without inverting W, and u of the problem has no meaning.
+    Bt2] = W and f = -q give these numbers without inverting W, and u of the problem has no meaning. The defaults are a
+    public test of the contact community.
 
     Parameters
     ----------

@@ -45,6 +45,9 @@ FRICTIONLESS = 4
 CONTACT, UNDECIDED = 5, 6
 #: Slip in any direction in 3D: the sector that is the whole circle (enumsol/model/sectors.py).
 SLIP = 9
+#: In floats, a condition within this of zero counts as met with equality where the largest forces and displacements are
+#: of size one: points are converged to about 1e-12.
+STATUS_TOLERANCE = 1e-9
 #: A node that is open or slips in one direction (theory, section 6.11).
 FORWARD, BACKWARD = 7, 8
 SLIDING = {FORWARD: (OPEN, SLIP_PLUS), BACKWARD: (OPEN, SLIP_MINUS)}

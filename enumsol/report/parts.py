@@ -40,8 +40,9 @@ if TYPE_CHECKING:
     from enumsol.roots.root_set import RootSet
     from enumsol.support.array_types import ArrayLike, Floats, Integers
 
-#: Most numbers of displacements, about ten characters each; a mesh with more is drawn by its boundary, or not at all.
-_MOST_NUMBERS = 150_000
+#: Most numbers of displacements, and of contact forces in tables, about ten characters each; a mesh with more is drawn
+#: by its boundary, or not at all.
+MOST_NUMBERS = 150_000
 #: Squares of directions below this are rounding, and directions.
 _ROUNDING = 1e-9
 
@@ -69,7 +70,7 @@ def body_record(problem: AnyProblem, scene: Scene | None = None) -> tuple[dict[s
         return None, (
             f"The mesh is too large to draw: the displacements of {len(nodes):,} nodes on its boundary by "
             f"{d * problem.p:,} contact forces and the load are {d * len(nodes) * columns:,} numbers, and a page holds "
-            f"at most {_MOST_NUMBERS:,}"
+            f"at most {MOST_NUMBERS:,}"
         )
     motion = sp.csr_array(mesh.motion[(d * nodes[:, None] + np.arange(d)).ravel()])
     solved = [problem.factorization.solve(np.asarray(column)) for column in _loads(problem)]
@@ -104,7 +105,7 @@ def surface_stresses(problem: AnyProblem, columns: int) -> Callable[[Floats], Fl
     if mesh.points.shape[1] != 3 or not mesh.has_material:
         return None
     _, cells = boundary(3, mesh.cells)
-    if 6 * len(cells) * columns > _MOST_NUMBERS:
+    if 6 * len(cells) * columns > MOST_NUMBERS:
         return None
     from enumsol.fem import cell_stresses  # scikit-fem takes a while
 
@@ -113,7 +114,7 @@ def surface_stresses(problem: AnyProblem, columns: int) -> Callable[[Floats], Fl
 
 def most_fields(nodes: int, d: int) -> int:
     """Number of fields of displacements, of d components at so many nodes, that a page holds."""
-    return _MOST_NUMBERS // (d * nodes)
+    return MOST_NUMBERS // (d * nodes)
 
 
 def drawn_body(problem: AnyProblem, columns: int, scene: Scene | None = None) -> tuple[dict[str, Any], Integers]:

@@ -14,6 +14,7 @@ from enumsol.errors import InvalidArgumentError
 from enumsol.loading.history_data import steps_table, tree_lines
 from enumsol.model.shapes import body_moves, contact_forces
 from enumsol.report import parts
+from enumsol.report.parts import MOST_NUMBERS
 from enumsol.roots.root import summary
 from enumsol.roots.root_set import ABOUT_STABILITY
 from enumsol.support.messages import counted, found_of, html_table
@@ -34,8 +35,6 @@ if TYPE_CHECKING:
 
 #: Rows of the tables of roots, continua and undecided parts.
 _MOST_ROWS = 500
-#: Most numbers of forces and displacements of contact nodes in tables, about ten characters each.
-_MOST_VALUES = 150_000
 
 
 def roots_page(found: RootSet, heading: parts.Heading) -> str:
@@ -202,7 +201,7 @@ def roots_content(found: RootSet, scene: Scene | None = None) -> dict[str, Any]:
     the contact nodes: all normal ones, then those along each tangent.
     """
     p = len(found.node_ids)
-    listed = found[: max(1, _MOST_VALUES // (8 * p))]
+    listed = found[: max(1, MOST_NUMBERS // (8 * p))]
     pictures, bodies = _pictures(listed, scene) if listed else (_picture(None, ""), [])
     bodies += [{}] * (len(listed) - len(bodies))
     verdicts = [{"stability": one.verdict} for one in found.verdicts or ()] or [{}] * len(listed)

@@ -31,7 +31,7 @@ from enumsol.roots.enumeration import Enumeration, not_begun
 from enumsol.roots.root_set import RootSet
 from enumsol.search.certifiers.protocol import UndecidedPart
 from enumsol.search.outcome import SearchLimits, SearchProgress, Stop, StopReason
-from enumsol.search.solvers import Arithmetic, Solvers
+from enumsol.search.solvers import BEYOND_DOUBT, Arithmetic, Solvers
 from enumsol.selections.float_selections import SIGN_TOLERANCE
 from enumsol.selections.solution import SelectionSolution, SelectionSolver
 from enumsol.support import arguments
@@ -55,8 +55,6 @@ if TYPE_CHECKING:
 
 #: Selections solved together in floats, and between two reports of progress.
 BLOCK = 2048
-#: Selections whose float solution breaks a condition by more than this are dropped without a second look.
-_SCREEN = 1e-6
 
 
 def all_codes(F_positive: tuple[bool, ...]) -> Iterator[Codes]:
@@ -115,9 +113,9 @@ def _candidates(system: ScaledSystem, block: NDArray[np.int8]) -> Mask:
     M[doubtful] = np.eye(2 * p)
     force = np.linalg.solve(M, (b / scale)[:, :, None])[:, :, 0]
     w = g - force @ S
-    size = _SCREEN * (1.0 + np.max(np.abs(force), axis=1, keepdims=True))
+    size = BEYOND_DOUBT * (1.0 + np.max(np.abs(force), axis=1, keepdims=True))
     n, t, wn, wt = force[:, :p], force[:, p:], w[:, :p], w[:, p:]
-    reach = F * n * (1 + _SCREEN) + size
+    reach = F * n * (1 + BEYOND_DOUBT) + size
     rows = [n + size, t, reach - t, reach + t, size - wn, wt + size, size - wt]  # in the order of RowKind
     broken = INEQUALITIES[block] & (np.stack(rows, axis=-1) < 0)
     return np.asarray(doubtful | ~np.any(broken, axis=(1, 2)))

@@ -27,6 +27,7 @@ from enumsol.model.statuses import (
     contact_status,
     space_status,
 )
+from enumsol.selections.solution import RANK_TOLERANCE
 from enumsol.support.array_types import Alpha, Codes, Floats
 from enumsol.support.immutable import Sealed
 from enumsol.support.messages import counted
@@ -41,10 +42,8 @@ if TYPE_CHECKING:
 
 #: Selections examined at one point (paper, Remark 5.1); six nodes in a corner of three statuses have 729.
 MAX_SELECTIONS = 4096
-#: A singular value of the normal map's scaled matrix below this counts as zero, as in arithmetic "fast".
-SINGULAR_TOLERANCE = 1e-12
-#: The same at transition points of a path, whose alpha is located to about 1e-10.
-LOCATED_SINGULAR_TOLERANCE = 1e-8
+#: In place of ``RANK_TOLERANCE`` at transition points of a path, whose alpha is located to about 1e-10.
+LOCATED_TOLERANCE = 1e-8
 _CODES = {**{status: code for code, status in enumerate(STATUSES)}, ContactStatus.SLIP: SLIP}
 
 
@@ -173,7 +172,7 @@ def branch_test(condensed: CondensedProblem, friction: tuple[Floats, Floats], ro
     if F.ndim == 2:
         scale = condensed.node_scale[: len(F), None]
         slips = NodeSlips.of(F, root.lambda_t * scale, root.u_t / scale)
-    return coherent_orientation(condensed.bordered, F, active, root.u_t, alpha, SINGULAR_TOLERANCE, slips)
+    return coherent_orientation(condensed.bordered, F, active, root.u_t, alpha, RANK_TOLERANCE, slips)
 
 
 def coherent_orientation(
@@ -182,7 +181,7 @@ def coherent_orientation(
     active: Sequence[Set[int]],
     slip: Floats,
     alpha: float,
-    singular: float = LOCATED_SINGULAR_TOLERANCE,
+    singular: float = LOCATED_TOLERANCE,
     slips: NodeSlips | None = None,
 ) -> LocalBranchTest:
     """The test for the statuses that hold at a solution.
@@ -226,7 +225,7 @@ def _status(code: int, slip: Floats) -> ContactStatus:
 
 
 def normal_map_sign(
-    S: Floats, F: Floats, codes: Codes, singular: float = SINGULAR_TOLERANCE, slips: NodeSlips | None = None
+    S: Floats, F: Floats, codes: Codes, singular: float = RANK_TOLERANCE, slips: NodeSlips | None = None
 ) -> int:
     """Sign of det DG in the cell of these statuses, 0 when it is singular; columns scaled to length one.
 

@@ -12,7 +12,7 @@ from enumsol.errors import InvalidArgumentError
 from enumsol.model.statuses import ContactStatus, sign_array
 from enumsol.roots.local_branch import ContactState, LocalBranchTest, branch_test
 from enumsol.support.immutable import Sealed, sealed
-from enumsol.support.messages import html_lines, html_table, visible
+from enumsol.support.messages import PRINTED, html_lines, html_table, visible
 from enumsol.support.plotting import checked_units, kept
 
 if TYPE_CHECKING:
@@ -23,9 +23,6 @@ if TYPE_CHECKING:
     from enumsol.condensation.condensed import CondensedProblem
     from enumsol.roots.local_branch import SelectionTangent, SlipSigns
     from enumsol.support.array_types import Alpha, Floats, NDArray
-
-#: Contact nodes of a printed root; of larger ones the first are shown.
-_PRINTED_NODES = 20
 
 
 @dataclass(frozen=True)
@@ -389,7 +386,7 @@ class RootFamily:
             for k, part in enumerate(self.polytopes)
         ]
         heads = ("polytope", "dimension", "vertices", "largest lambda_n", "contact")
-        return html_lines([heading]) + html_table(heads, rows[:_PRINTED_NODES])
+        return html_lines([heading]) + html_table(heads, rows[:PRINTED])
 
 
 def root_heading(root: Root) -> str:
@@ -401,7 +398,7 @@ def root_heading(root: Root) -> str:
 
 def root_html(root: Root, labels: tuple[Any, ...], places: Floats | None = None) -> str:
     """A root in a notebook: its heading, and a table over the contact nodes; of many the first."""
-    shown = min(len(labels), _PRINTED_NODES)
+    shown = min(len(labels), PRINTED)
     heads = _node_heads(1 if root.lambda_t.ndim == 1 else 2)
     rows = [
         (labels[i], root.statuses[i].value, *(f"{x:.6g}" for x in _node_numbers(root, i)), *_place(places, i))
@@ -417,7 +414,7 @@ def root_html(root: Root, labels: tuple[Any, ...], places: Floats | None = None)
 
 def node_table(state: ContactState, labels: tuple[Any, ...], places: Floats | None = None) -> list[str]:
     """Lines of a table over the contact nodes, with their places if these are known; of many the first."""
-    shown = min(len(labels), _PRINTED_NODES)
+    shown = min(len(labels), PRINTED)
     width = max(4, *(len(visible(label)) for label in labels[:shown]))
     lines = [
         node_heading(width, 1 if state.lambda_t.ndim == 1 else 2, places),

@@ -13,7 +13,7 @@ from enumsol.errors import InvalidArgumentError
 from enumsol.roots.root import Enclosure, Root, RootFamily, summary
 from enumsol.support.arguments import shown
 from enumsol.support.immutable import Immutable, Listed, Sealed
-from enumsol.support.messages import counted, found_of, html_lines, html_table
+from enumsol.support.messages import PRINTED, counted, found_of, html_lines, html_table
 from enumsol.support.plotting import checked_units, kept
 
 if TYPE_CHECKING:
@@ -29,7 +29,7 @@ if TYPE_CHECKING:
     from enumsol.search.certifiers.protocol import Escalations
     from enumsol.support.array_types import Alpha, ArrayLike, Floats
 
-_PRINTED_ROOTS, _PRINTED_REGIONS = 20, 5
+_PRINTED_REGIONS = 5
 _HEADS = ("", "index", "regular", "margin", "max lambda_n", "contact")
 #: What the heads mean, below the table.
 _EXPLAINED = (
@@ -503,15 +503,15 @@ class RootSet(Sequence[Root], Immutable):
                 *(() if verdicts is None else (verdicts[k].verdict,)),
                 summary(root.statuses),
             )
-            for k, root in enumerate(self._roots[:_PRINTED_ROOTS])
+            for k, root in enumerate(self._roots[:PRINTED])
         ]
 
     def _notes(self) -> list[str]:
         """The lines below the table of roots."""
         lines = []
-        if len(self) > _PRINTED_ROOTS:
-            lines.append(f"   ... {len(self) - _PRINTED_ROOTS} more")
-        for k, family in enumerate(self.families[:_PRINTED_ROOTS]):
+        if len(self) > PRINTED:
+            lines.append(f"   ... {len(self) - PRINTED} more")
+        for k, family in enumerate(self.families[:PRINTED]):
             index = "?" if family.index is None else f"{family.index:+d}"
             lines.append(
                 f"family {k}: dimension {family.dimension}, {counted(len(family.polytopes), 'polytope')}, "

@@ -331,8 +331,9 @@ def _present(value: _T | None) -> _T:
     return value
 
 
-#: A condition is broken beyond doubt: one that is broken by less may hold within the tolerance at another point.
-_CLEARLY = 1e-6
+#: A condition is broken beyond doubt: one that is broken by less may hold within the tolerance at another point, or was
+#: computed with rounding.
+BEYOND_DOUBT = 1e-6
 
 
 class FastCertifier(Certifier):
@@ -369,7 +370,7 @@ class FastCertifier(Certifier):
         # a point whose conditions hold within the tolerance is nearer than this to the solution of a closed subtree
         if 2.0 * solver.tolerance * proposal.reduction.sensitivity > 1e-3:
             return None
-        if proposal.least < -max(_CLEARLY, 2.0 * solver.tolerance):
+        if proposal.least < -max(BEYOND_DOUBT, 2.0 * solver.tolerance):
             return []
         solution = solver.solve(proposal.selection)
         if solution is None or solution.dimension > 0 or not holds_below(codes, solver.active(solution.vertices[0])):

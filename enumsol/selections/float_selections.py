@@ -10,7 +10,7 @@ import numpy as np
 from scipy.linalg import cho_solve
 
 from enumsol.model.statuses import CONDITIONS, FRICTIONLESS, SLIP_PLUS, RowKind, active_within
-from enumsol.selections.solution import MAX_BASES, ActiveSets, SelectionSolution, VertexLimitError
+from enumsol.selections.solution import MAX_BASES, RANK_TOLERANCE, ActiveSets, SelectionSolution, VertexLimitError
 from enumsol.trusted.selection import Selection, row_values
 
 if TYPE_CHECKING:
@@ -20,8 +20,6 @@ if TYPE_CHECKING:
 #: Default of arithmetic "fast": a condition within this of zero counts as zero. It is relative to the energy norm of
 #: the load: forces are measured by sqrt((S^-1)_ii) and displacements by sqrt(S_ii), the bounds that hold at roots.
 SIGN_TOLERANCE = 1e-9
-#: A singular value of a selection's scaled matrix (entries at most one) below this counts as zero.
-RANK_TOLERANCE = 1e-12
 
 
 class FloatSelections:

@@ -15,6 +15,9 @@ ActiveSets = tuple[frozenset[int], ...]
 
 #: Vertex enumeration tries at most this many bases; a polytope that needs more is refused.
 MAX_BASES = 200_000
+#: In floats, a singular value of the scaled matrix of a selection or of the normal map, with entries at most one, below
+#: this counts as zero.
+RANK_TOLERANCE = 1e-12
 
 
 @dataclass(frozen=True)

@@ -10,6 +10,8 @@ from html import escape
 
 #: Categories of characters that control a terminal (also the direction of writing), or that have no picture.
 _UNSEEN = frozenset(("Cc", "Cf", "Cn", "Co", "Cs", "Zl", "Zp"))
+#: Roots, branches and contact nodes that a printed result lists one by one; of more the first ones.
+PRINTED = 20
 
 
 class TextEnum(enum.StrEnum):

@@ -128,7 +128,7 @@ def test_what_is_said_of_a_body_that_is_not_drawn(monkeypatch):
     bare, meshed = (branch_graph(one, (0, 1)) for one in (enumsol.ContactProblem(*matrices(square)), square))
     made = content.report_content(bare)
     assert (made["body"], made["no_body"]) == (None, "The problem has no mesh, so no body is drawn")
-    monkeypatch.setattr(bodies, "_MOST_NUMBERS", 10)
+    monkeypatch.setattr(bodies, "MOST_NUMBERS", 10)
     made = content.report_content(meshed)
     assert made["body"] is None
     assert "too large to draw: the displacements of 4 nodes" in made["no_body"]

@@ -206,7 +206,7 @@ def test_lines_of_a_fine_mesh_are_thin_or_gone(browser, fine):
 
 
 def test_a_body_drawn_by_its_boundary_keeps_its_lines(browser, tmp_path, monkeypatch):
-    monkeypatch.setattr("enumsol.report.parts._MOST_NUMBERS", 600)
+    monkeypatch.setattr("enumsol.report.parts.MOST_NUMBERS", 600)
     acting = {"contact": "bottom", "clamp": "left", "load": {"top": (0.1, -0.3)}, "friction": 0.4}
     write_report(
         enumerate_roots(fem.mesh_problem(grid(20, 10, 4), young=7, poisson=0.3, **acting), 0), tmp_path / "p.html"

@@ -168,22 +168,22 @@ def test_pages_are_small_and_ask_the_network_for_nothing(pages, monkeypatch):
         for tag, attributes in Reader(text).tags:
             assert not {"src", "srcset", "data", "action"} & set(attributes), tag
     roots = enumerate_roots(gallery.chain(2), 5)
-    monkeypatch.setattr(roots_page, "_MOST_VALUES", 40)
+    monkeypatch.setattr(roots_page, "MOST_NUMBERS", 40)
     shortened = roots_page.roots_content(roots)
     assert (len(shortened["roots"]), shortened["all"]) == (2, 9)
 
 
 def test_large_meshes_are_drawn_in_part_or_not_at_all(found, monkeypatch):
     count = 3 * len(roots_page.roots_content(found["wedge"])["body"]["points"])
-    monkeypatch.setattr(parts, "_MOST_NUMBERS", 4 * count)
+    monkeypatch.setattr(parts, "MOST_NUMBERS", 4 * count)
     part = roots_page.roots_content(found["wedge"])
     assert ["u" in record for record in part["roots"]] == [True] * 3 + [False] * 6
     assert part["no_body"] == "The bodies of the first 3 roots are drawn: the page holds no more"
-    monkeypatch.setattr(parts, "_MOST_NUMBERS", count)
+    monkeypatch.setattr(parts, "MOST_NUMBERS", count)
     assert roots_page.roots_content(found["wedge"])["no_body"].startswith("The mesh is too large to draw: ")
     plane = found["plane"]
     nodes = len(plane[0].problem.mesh.points)
-    monkeypatch.setattr(parts, "_MOST_NUMBERS", 2 * nodes * (len(plane) + 1) - 1)
+    monkeypatch.setattr(parts, "MOST_NUMBERS", 2 * nodes * (len(plane) + 1) - 1)
     boundary = roots_page.roots_content(plane)["body"]
     assert boundary["cells"] is None
     assert len(boundary["points"]) == len(boundary["lines"]) < nodes

@@ -22,8 +22,8 @@ if TYPE_CHECKING:
 
 #: What a writer of proofs asks for beyond what a checker does.
 MARGIN = 2.0**-10
-#: How often a set around a box is made larger, its image taken again.
-_WIDENINGS, _IMAGES = 6, 2
+#: How often a set around a box, or the box of an arc, is made larger; how often its image is taken again.
+WIDENINGS, _IMAGES = 6, 2
 
 
 @dataclass(frozen=True)
@@ -171,7 +171,7 @@ class NaturalMap:
         known.
         """
         step = None
-        for _ in range(_WIDENINGS):
+        for _ in range(WIDENINGS):
             step = self.step(self.extent(radius, side))
             shares = None if step is None else step.shares(radius, self.half)
             if step is None or shares is None:

@@ -12,7 +12,7 @@ import numpy as np
 
 from enumsol.arithmetic.balls import SAFE, TINY, UNIT, Ball
 from enumsol.trusted.space.force_bound import is_unbalanced_in_space
-from enumsol.trusted.space.krawczyk import MARGIN
+from enumsol.trusted.space.krawczyk import MARGIN, WIDENINGS
 from enumsol.trusted.space.leaf_equations import (
     Leaf,
     around_middle,
@@ -36,8 +36,8 @@ if TYPE_CHECKING:
     from enumsol.trusted.space.sector_rows import Row
     from enumsol.trusted.space.solution_curve import AlphaProblem, SolutionCurve
 
-#: How often the box of an arc is made wider, and by how much more than is needed.
-_WIDENINGS, _ROOM = 6, 1.125
+#: By how much more than is needed the box of an arc is made wider.
+_ROOM = 1.125
 #: How often a piece is narrowed for a leaf, to which multiples of its half, and where that is too little.
 _NARROWINGS, _GRID, _NARROWER = 8, 1 << 12, Fraction(3, 2)
 #: Halvings of the way through a box.
@@ -337,7 +337,7 @@ def _arc_in(leaf: Leaf, angle: Floats, radius: Floats, errors: float) -> LeafArc
     k, Y = chosen
     others = np.delete(np.arange(q + 1), k)
     psi = others[others < q]
-    for _ in range(_WIDENINGS):
+    for _ in range(WIDENINGS):
         state, sizes = leaf.over(angle, radius), np.r_[radius, 1.0]
         if state is None or not state.whole_J.finite:
             return None
