@@ -31,8 +31,8 @@ if TYPE_CHECKING:
 _NEAR_ONE = 8
 #: Smaller coefficients than this, but for 0, would make tau overflow float64, as units beyond theirs would.
 LEAST_FRICTION = 2.0**-UNIT_EXPONENT
-#: Points of an interval whose data are kept, pieces of it, and relaxations there.
-KEPT = 256
+#: Points of an interval whose data are kept.
+_KEPT = 256
 
 
 class FrictionUnits:
@@ -364,7 +364,7 @@ class AlphaSpace:
         found = self._points.get(alpha)
         if found is None:
             found = self._points[alpha] = self.over(alpha, alpha)
-            if len(self._points) > KEPT:
+            if len(self._points) > _KEPT:
                 del self._points[next(iter(self._points))]
         return found
 

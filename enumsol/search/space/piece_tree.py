@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from enumsol.arithmetic.rationals import simplest
-from enumsol.condensation.space_condensed import KEPT, AlphaSpace
+from enumsol.condensation.space_condensed import AlphaSpace
 from enumsol.model.sectors import DEEPEST, SECTORS, level_of, width_level
 from enumsol.model.statuses import CONTACT, UNDECIDED
 from enumsol.proof.curve_records import OnCurve
@@ -45,6 +45,8 @@ if TYPE_CHECKING:
     #: The record of a node, and its children.
     Done = tuple[Record | "OpenLeaf", list["PieceNode"]]
 
+#: Pieces, and points with their relaxations, that are kept.
+_KEPT = 256
 #: Pieces are cut down to this share of the interval where only their length stands in the way of a certificate.
 _ALONE = 2.0**-5
 #: Pieces are cut so often at most between two branchings where multipliers fail at their ends only.
@@ -157,8 +159,8 @@ class PieceTree:
         self.space = AlphaSpace(enclosure, sum(interval, Fraction(0)) / 2, units)
         self._most, self._tick = max_nodes, tick
         self._least = Fraction(smallest) * (interval[1] - interval[0])
-        self._examined = lru_cache(KEPT)(lambda low, high: ExaminedPiece(AlphaPiece(self.space, low, high)))
-        self._point = lru_cache(KEPT)(partial(AlphaPoint, self.space))
+        self._examined = lru_cache(_KEPT)(lambda low, high: ExaminedPiece(AlphaPiece(self.space, low, high)))
+        self._point = lru_cache(_KEPT)(partial(AlphaPoint, self.space))
         self.records: list[Record | OpenLeaf] = []
         self.nodes, self.covered, self.settled = 0, 0.0, False
         self.stopped: StopReason | None = None
