@@ -43,7 +43,7 @@ _LEVEL = 1
 _RAW = -zlib.MAX_WBITS
 _ENCODER = json.JSONEncoder(separators=(",", ":"), allow_nan=False)
 #: How a stream of this level and window begins, and the empty last block (RFC 1950, RFC 1951).
-BEGIN, _LAST = b"\x78\x01", b"\x03\x00"
+BEGIN, LAST = b"\x78\x01", b"\x03\x00"
 #: Modulus of Adler-32.
 _ADLER = 65521
 
@@ -78,22 +78,12 @@ class Part:
         return cls(data, len(text), zlib.adler32(text))
 
 
-class Checksum:
-    """Adler-32 of parts that follow on each other (RFC 1950)."""
-
-    def __init__(self) -> None:
-        self._low, self._high = 1, 0
-
-    def add(self, part: Part) -> None:
-        """Go on with a part."""
-        low, high = part.adler & 0xFFFF, part.adler >> 16
-        # the part's own sums began with low = 1
-        self._high = (self._high + high + part.size * (self._low - 1)) % _ADLER
-        self._low = (self._low + low - 1) % _ADLER
-
-    def end(self) -> bytes:
-        """Last bytes of the stream."""
-        return _LAST + (self._high << 16 | self._low).to_bytes(4, "big")
+def checksum(before: int, part: Part) -> int:
+    """Adler-32 of a text that goes on with a part (RFC 1950); of no text it is 1."""
+    # the part's own sums began with 1
+    first = (before & 0xFFFF) - 1
+    low, high = first + (part.adler & 0xFFFF), (before >> 16) + (part.adler >> 16) + part.size * first
+    return high % _ADLER << 16 | low % _ADLER
 
 
 class Recorder(Protocol):
@@ -193,7 +183,7 @@ class ProofWriter:
                 self._file = self._opened(self._path)
         self.failure: str | None = None
         self._digest = hashlib.sha256()
-        self._checksum = Checksum()
+        self._checksum = 1
         self._pending: list[str] = []
         self._emit(MAGIC + BEGIN)
 
@@ -232,7 +222,7 @@ class ProofWriter:
         """Finish the file and give the proof; a damaged one when there was a ``failure``."""
         if not self._file.closed:  # by an earlier call, which was interrupted
             self._flush()
-            self._emit(self._checksum.end())
+            self._emit(LAST + self._checksum.to_bytes(4, "big"))
             self._emit(self._digest.digest())
         if self._path is None:
             return Proof(self._file.getvalue())  # type: ignore[attr-defined]
@@ -280,7 +270,7 @@ class ProofWriter:
             self._append(Part.of(pending))
 
     def _append(self, part: Part) -> None:
-        self._checksum.add(part)
+        self._checksum = checksum(self._checksum, part)
         self._emit(part.data)
         if self.failure is None:
             self._attempt(self._file.flush)
