@@ -218,6 +218,19 @@ def test_a_broken_reference_in_a_source_is_found():
     assert complaints == ["theory has no section 99", "theory has no equation (5.99)"]
 
 
+def test_the_map_names_what_there_is():
+    text = (ROOT / "docs" / "architecture.md").read_text(encoding="utf-8")
+    places = re.findall(r"`([a-z_]+(?:/[\w.]*)+)`", text)
+    assert len(places) > 100
+    assert [place for place in places if not any((ROOT / top / place).exists() for top in ("", "enumsol"))] == []
+    sources = "".join(file.read_text(encoding="utf-8") for file in SOURCES)
+    classes = re.findall(r"`([A-Z]\w*[a-z]\w*)(?:\.\w+)?`", text)
+    assert len(classes) > 40
+    assert [
+        name for name in classes if not re.search(rf"^ *(class {name}\b|{name}\b.* = )", sources, re.MULTILINE)
+    ] == []
+
+
 def recipes():
     """The recipes of docs/architecture.md and those of CONTRIBUTING.md, by their titles."""
     found = {}

@@ -222,7 +222,7 @@ class Part:
         return [row for row in range(len(self.B)) if row not in self.yields]
 
     def grows(self, low, high, slides):
-        """(15.5) The motion itself, where the determinant vanishes."""
+        """The motion itself, where the determinant vanishes (theory, section 15.4)."""
         low, high = arb(exact(low)), arb(exact(high))
         need(0 < low < high, "no range")
         need(self.massive is not None, "no mass")
@@ -250,7 +250,7 @@ class Part:
         need(all(r[i] > 0 for i in range(self.count) if i not in slides), "a node that stays would slide")
 
     def quiet(self, records):
-        """(15.7) for every record, and all of mu and all ways in which nodes slide or stay."""
+        """Every record by theory, (15.7), and all of mu and all ways in which nodes slide or stay."""
         leaves = []
         for name, _, low, high, beside, slides, stays, kappa, *N in records:
             need(name == "n", "a motion that grows")
@@ -300,7 +300,7 @@ class Part:
             need(not own or is_definite(columns(columns(Q, own).transpose(), own)), "a form is not definite")
 
     def bounds(self, a, b, c):
-        """(15.7), (15.8) K, or its slope, and E at both ends."""
+        """K, or its slope, and E at both ends (theory, (15.7) and (15.8))."""
         first = self.at(a)
         if c is not None:
             need(c < a or (b is not None and c > b), "a point within the range")
