@@ -43,9 +43,6 @@ if TYPE_CHECKING:
 
 _Graph = TypeVar("_Graph", bound=GraphData)
 FORMAT, VERSION = "enumsol-branch-graph", 3
-#: Version 1 gave kinds to the vertices of graphs that were not complete; only its complete graphs are read. Before
-#: version 3 every vertex with a single arc was "broken".
-_READ = (1, 2, 3)
 #: Contact rows in 3D, and in 2D.
 _ROWS = ("Bn", "Bt1", "Bt2"), ("Bn", "Bt")
 #: Arrays of a vertex.
@@ -99,13 +96,8 @@ def load_graph(kind: type[_Graph], file: str | Path) -> _Graph:
     with reading(place, "a graph", "BranchGraph.save"):
         content = place.read_bytes()
         record = json_from(content)
-        if not isinstance(record, dict) or record.get("format") != FORMAT or record.get("version") not in _READ:
+        if not isinstance(record, dict) or (record.get("format"), record.get("version")) != (FORMAT, VERSION):
             raise InvalidArgumentError(f"graph {file} has another format; expected {FORMAT}, version {VERSION}")
-        if record["version"] == 1 and record["reasons"]:
-            raise InvalidArgumentError(
-                f"graph {file} is not complete and was saved by an earlier version, which claimed more about such "
-                "graphs than is known; expected a complete one, or one saved by this version"
-            )
         return _from_record(kind, record, len(content))
 
 
@@ -175,7 +167,7 @@ def _graph_kind(problem: AnyProblem, vertices: object) -> dict[str, Any]:
     }
     return {
         **{"interval": pair, "left_open?": [pair], "arithmetic": {"verified", "exact", "fast"}, "reasons": [str]},
-        **{"arcs_by?": {"exact", "balls"}, "condensed_exactly": bool, "vertices": [vertex], "arcs": [arc]},
+        **{"arcs_by": {"exact", "balls"}, "condensed_exactly": bool, "vertices": [vertex], "arcs": [arc]},
         "verdicts?": [[{"low": float, "high": float, "verdict": {*VERDICTS}, "growth": Maybe((float, float))}]],
         "stats": dict.fromkeys((f"{item.name}?" for item in fields(GraphStats)), is_number),
     }
@@ -216,7 +208,7 @@ def _values(
     def of_selection(make: Callable[[Codes, Fraction], ArcValues], item: dict[str, Any]) -> ArcValues:
         return make(tuple(item["selections"][0]), Fraction(item["sample"]))
 
-    if record.get("arcs_by", "exact") == "balls":
+    if record["arcs_by"] == "balls":
         traced = cache(lambda: TracedProblem(problem, interval, vanishing_alpha(problem, "problem")))
         return None, partial(of_selection, lambda codes, sample: TracedArcValues(traced(), codes, sample))
     exactly = record["condensed_exactly"]
@@ -346,12 +338,6 @@ def _vertex_record(v: Vertex) -> dict[str, Any]:
     }
 
 
-def _kind(item: dict[str, Any]) -> VertexKind:
-    """The kind of a vertex, by its name of today."""
-    kind, degrees = VertexKind(item["kind"]), (item["index_left"], item["index_right"])
-    return VertexKind.TERMINAL if kind is VertexKind.BROKEN and degrees[0] == degrees[1] else kind
-
-
 def _vertex(number: int, item: dict[str, Any], *, balls: bool) -> Vertex:
     lo, hi = (fmpq(*Fraction(item[end]).as_integer_ratio()) for end in ("lo", "hi"))
     coefficients = item["polynomial"]
@@ -373,7 +359,7 @@ def _vertex(number: int, item: dict[str, Any], *, balls: bool) -> Vertex:
     return Vertex(
         number=number,
         alpha=item["alpha"],
-        kind=_kind(item),
+        kind=VertexKind(item["kind"]),
         border=item["border"],
         statuses=_statuses(item["statuses"]),
         active=tuple(frozenset(_statuses(names)) for names in item["active"]),

@@ -153,8 +153,8 @@ def test_a_saved_graph_is_read_back_to_the_last_bit(name, arithmetic, tmp_path):
 def test_files_that_are_no_graphs_are_refused(tmp_path):
     file = tmp_path / "graph.json"
     bad_argument("cannot be read", BranchGraph.load, file)
-    old = '{"format": "enumsol-branch-graph", "version": 1}'
-    for text, message in (("{", "JSON"), ("[]", "format"), (old, "'reasons' is missing")):
+    old, bare = (f'{{"format": "enumsol-branch-graph", "version": {version}}}' for version in (2, 3))
+    for text, message in (("{", "JSON"), ("[]", "format"), (old, "version 3"), (bare, "'problem' is missing")):
         file.write_text(text)
         bad_argument(message, BranchGraph.load, file)
 

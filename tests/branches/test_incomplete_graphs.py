@@ -8,7 +8,7 @@ from command_line import printed
 from complete import read_back
 from refusals import refusal
 
-from enumsol import BranchGraph, branch_graph, gallery
+from enumsol import branch_graph, gallery
 from enumsol.branches.claims import Standing
 from enumsol.errors import IncompleteGraphError
 
@@ -97,24 +97,12 @@ def test_it_is_read_back_with_the_same_claims(cut, tmp_path):
         _ = read.uniqueness_limit
 
 
-def test_an_incomplete_graph_of_an_earlier_version_is_refused(cut, tmp_path):
-    with pytest.raises(ValueError, match="earlier version"):
-        BranchGraph.load(of_version_1(cut, tmp_path / "old.json"))
-
-
-def of_version_1(graph, file):
-    graph.save(file)
-    file.write_text(json.dumps({**json.loads(file.read_text()), "version": 1}))
-    return file
-
-
-def test_a_complete_graph_still_answers(problem, tmp_path):
+def test_a_complete_graph_still_answers(problem):
     graph = branch_graph(problem, INTERVAL)
     assert graph.claims.standing is Standing.PROVEN
     assert (graph.uniqueness_limit, graph.multiplicity_at(3.5), graph.at_least(3.5)) == (3.0, 5, 5)
     assert graph.steps[2] == [1, 5, 3]
     assert [v.alpha for v in graph.jumps] == [pytest.approx(3.82842712474619)]
-    assert BranchGraph.load(of_version_1(graph, tmp_path / "old.json")).complete
 
 
 def test_fast_arithmetic_that_ran_to_its_end_is_not_proven(problem, capsys):
