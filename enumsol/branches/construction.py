@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import time
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields, replace
 from fractions import Fraction
 from functools import partial
 from typing import TYPE_CHECKING
 
 from enumsol.branches.graph import BranchGraph
-from enumsol.branches.ways import Arithmetic, Made, PlaneWay, not_condensed, way_of
+from enumsol.branches.ways import Arithmetic, PlaneWay, not_condensed, way_of
 from enumsol.condensation.data import exactly_at
 from enumsol.errors import InvalidArgumentError
 from enumsol.model.problem import ContactProblem, check_is_problem
@@ -22,6 +22,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable
     from concurrent.futures import Executor
 
+    from enumsol.branches.graph_data import GraphData
     from enumsol.branches.space.space_graph import ByCurves
     from enumsol.model.problem3d import AnyProblem
     from enumsol.support.array_types import AlphaLike
@@ -149,7 +150,7 @@ class _Construction:
             with within(limits):
                 way = self.way = self._way()
         except TimeOverError:
-            return self._graph(not_condensed(StopReason.TIME_LIMIT))
+            return self._graph(self._nothing(StopReason.TIME_LIMIT))
         way.run(max_nodes, limits, _stage(progress, "search"), executor)
         self.searched = time.perf_counter()
         return self._graph(way.made(limits.extended(self.started), _stage(progress, "arcs")))
@@ -164,23 +165,17 @@ class _Construction:
     def cut_short(self, ending: Ending) -> BranchGraph:
         """The graph of what was found before something ended ``run``, wherever that was."""
         reason = StopReason.of(ending)
-        return self._graph(not_condensed(reason) if self.way is None else self.way.ended(reason))
+        return self._graph(self._nothing(reason) if self.way is None else self.way.ended(reason))
 
-    def _graph(self, made: Made) -> BranchGraph:
+    def _nothing(self, reason: StopReason) -> GraphData:
+        return not_condensed(self.problem, self.interval, self.arithmetic, reason)
+
+    def _graph(self, made: GraphData) -> BranchGraph:
         now = time.perf_counter()
         searched = (now if self.searched is None else self.searched) - self.started
+        parts = {item.name: getattr(made, item.name) for item in fields(made)}
         return BranchGraph(
-            problem=self.problem,
-            exact=made.exact,
-            exact_interval=self.interval,
-            arithmetic=self.arithmetic,
-            vertices=tuple(made.vertices),
-            arcs=tuple(made.arcs),
-            undecided=tuple(made.undecided),
-            stats=replace(made.stats, search_seconds=searched, seconds=now - self.started),
-            pieces=tuple(made.pieces),
-            make_proof=made.make_proof,
-            left_open=made.left_open,
+            **parts | {"stats": replace(made.stats, search_seconds=searched, seconds=now - self.started)}
         )
 
 

@@ -66,6 +66,8 @@ class GraphStats:
 class GraphData(Immutable):
     """Vertices and arcs over an interval, where they come from, and what they are parts of; see BranchGraph.
 
+    A way of working out a graph (``ways``) makes one, without the times.
+
     Attributes
     ----------
     problem : ContactProblem or ContactProblem3D

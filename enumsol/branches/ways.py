@@ -15,7 +15,7 @@ from enumsol.branches.elements import Effort
 from enumsol.branches.enclosed.following import Followed, TracedProblem, follow_selections, make_traced
 from enumsol.branches.enclosed.single_branches import ClosedPieces
 from enumsol.branches.gluing import glue
-from enumsol.branches.graph_data import GraphStats
+from enumsol.branches.graph_data import GraphData, GraphStats
 from enumsol.branches.known_selections import KnownSelections
 from enumsol.branches.proof_records import write_graph_proof
 from enumsol.condensation.data import EXACT_DOF_LIMIT
@@ -37,6 +37,7 @@ if TYPE_CHECKING:
     from enumsol.branches.elements import Arc, Tick, Vertex
     from enumsol.branches.enclosed.cutting import Trace
     from enumsol.model.problem import ContactProblem
+    from enumsol.model.problem3d import AnyProblem
     from enumsol.proof.proof_file import Proof
     from enumsol.search.subintervals import SearchedPiece
     from enumsol.support.array_types import Codes
@@ -54,35 +55,6 @@ _BOXES_AFTER_INTERRUPT = 500
 _SELECTIONS_AFTER_INTERRUPT = 4096
 
 
-@dataclass(frozen=True)
-class Made:
-    """Vertices and arcs of a graph, and what is told of them.
-
-    Attributes
-    ----------
-    vertices, arcs : sequences of Vertex and Arc
-    undecided : sequence of str
-    stats : GraphStats
-        Without times.
-    exact : ExactCondensed, optional
-        The problem in rationals, if arcs rest on it.
-    pieces : sequence of SearchedPiece
-    make_proof : callable, optional
-        Makes the proof once it is asked for.
-    left_open : sequence of (Fraction, Fraction), optional
-        Ranges of alpha outside of which nothing is missing.
-    """
-
-    vertices: Sequence[Vertex]
-    arcs: Sequence[Arc]
-    undecided: Sequence[str]
-    stats: GraphStats
-    exact: ExactCondensed | None = None
-    pieces: Sequence[SearchedPiece] = ()
-    make_proof: Callable[[], Proof | None] | None = None
-    left_open: tuple[tuple[Fraction, Fraction], ...] | None = None
-
-
 @dataclass
 class PlaneWay:
     """The way in 2D: the selections that a search over the interval leaves, and their arcs.
@@ -95,6 +67,7 @@ class PlaneWay:
     ----------
     problem : ContactProblem
     interval : (Fraction, Fraction)
+    arithmetic : str
     certifier : IntervalCertifier
     exact : ExactCondensed or None
         The problem in rationals, where arcs are worked out by algebra.
@@ -114,6 +87,7 @@ class PlaneWay:
 
     problem: ContactProblem
     interval: tuple[Fraction, Fraction]
+    arithmetic: Arithmetic
     certifier: IntervalCertifier
     exact: ExactCondensed | None = None
     traced: TracedProblem | None = None
@@ -169,23 +143,23 @@ class PlaneWay:
             run_parallel(executor, search)
         self.candidates = search.selections
 
-    def made(self, limits: Deadline, tick: Tick | None) -> Made:
+    def made(self, limits: Deadline, tick: Tick | None) -> GraphData:
         """Arcs, worked out and joined by a deadline; what is not joined stays open."""
         if self.search is None:
-            return not_condensed(StopReason.TIME_LIMIT)
+            return self.ended(StopReason.TIME_LIMIT)
         with within(limits.part(_JOINED)):
             return self.worked_out(Effort(tick, limits.part(_WORKED_OUT)))
 
-    def ended(self, reason: StopReason) -> Made:
+    def ended(self, reason: StopReason) -> GraphData:
         """Arcs that were worked out by then, and some more if the search was ended."""
         search = self.search
         if search is None:
-            return not_condensed(reason)
+            return not_condensed(self.problem, self.interval, self.arithmetic, reason)
         if self.candidates is None and (search.stopped is None or not search.stopped.interrupted):
             search.stopped = Stop(reason, search.nodes)
         return self.worked_out(Effort(ended=reason))
 
-    def worked_out(self, effort: Effort) -> Made:
+    def worked_out(self, effort: Effort) -> GraphData:
         """Arcs of the selections that were found."""
         search, candidates = self._found()
         if self.exact is None and self.traced is not None:
@@ -230,7 +204,7 @@ class PlaneWay:
 
     def _made(
         self, elements: tuple[Sequence[Vertex], Sequence[Arc]], reasons: Sequence[str], stopped: Stop | None
-    ) -> Made:
+    ) -> GraphData:
         """Vertices and arcs with what is told of them; there is no proof if the time was over."""
         search, candidates = self._found()
         stops = [stop for stop in (search.stopped, stopped) if stop is not None]
@@ -248,12 +222,17 @@ class PlaneWay:
             selections=len(candidates),
             bounded=sum(found.closed.bounded if found.closed else found.system is not None for found in search.pieces),
         )
-        return Made(*elements, (*map(str, stops), *reasons), stats, self.exact, tuple(search.pieces), proof)
+        (vertices, arcs), undecided = elements, (*map(str, stops), *reasons)
+        found = tuple(vertices), tuple(arcs), undecided, stats, tuple(search.pieces), proof
+        return GraphData(self.problem, self.exact, self.interval, self.arithmetic, *found)
 
 
-def not_condensed(reason: StopReason) -> Made:
+def not_condensed(
+    problem: AnyProblem, interval: tuple[Fraction, Fraction], arithmetic: Arithmetic, reason: StopReason
+) -> GraphData:
     """Nothing, of a call that ended before the body was condensed."""
-    return Made((), (), (f"{Stop(reason)} before the body was condensed to its contact nodes",), GraphStats())
+    why = f"{Stop(reason)} before the body was condensed to its contact nodes"
+    return GraphData(problem, None, interval, arithmetic, (), (), (why,), GraphStats())
 
 
 def by_algebra(
@@ -268,7 +247,7 @@ def by_algebra(
         certifier = ExactIntervalCertifier(exact)
     elif arithmetic == "verified":
         certifier = VerifiedIntervalCertifier(problem, exact)
-    return PlaneWay(problem, interval, certifier, exact)
+    return PlaneWay(problem, interval, arithmetic, certifier, exact)
 
 
 def way_of(problem: ContactProblem, interval: tuple[Fraction, Fraction], arithmetic: Arithmetic) -> PlaneWay:
@@ -285,7 +264,7 @@ def way_of(problem: ContactProblem, interval: tuple[Fraction, Fraction], arithme
     at_rest = large and held and never_loaded(problem)
     if large and not at_rest and (traced := _traced(problem, interval)) is not None:
         certifier = VerifiedIntervalCertifier(problem, None, traced.origin if held else None)
-        return PlaneWay(problem, interval, certifier, traced=traced)
+        return PlaneWay(problem, interval, arithmetic, certifier, traced=traced)
     if held and arithmetic != "exact" and problem.n > (EXACT_DOF_LIMIT if at_rest else FAST_EXACT_DOF):
         return by_algebra(problem, interval, ExactCondensed.from_condensed(problem), arithmetic)
     if large and not held and problem.n > EXACT_DOF_LIMIT:

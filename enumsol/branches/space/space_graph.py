@@ -11,12 +11,11 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from enumsol.branches.elements import ANOTHER_INTERVAL, MORE_NODES, MORE_TIME, SHORT_INTERVAL
-from enumsol.branches.graph_data import GraphStats
+from enumsol.branches.graph_data import GraphData, GraphStats
 from enumsol.branches.proof_records import graph_header
 from enumsol.branches.space.chains import chain_through
 from enumsol.branches.space.make_curved import CurvedGraph
 from enumsol.branches.space.pieces import runs_and_turns
-from enumsol.branches.ways import Made
 from enumsol.condensation.enclosure import NotEnclosedError, enclosure_of
 from enumsol.model.sectors import SECTORS, is_sector, nearest, run_of
 from enumsol.proof.curve_records import box_record
@@ -43,7 +42,6 @@ if TYPE_CHECKING:
     from concurrent.futures import Executor
 
     from enumsol.branches.elements import Arc, Tick, Vertex
-    from enumsol.branches.graph_data import GraphData
     from enumsol.condensation.enclosure import CondensedEnclosure
     from enumsol.condensation.space_condensed import EnclosedSpace
     from enumsol.model.problem3d import ContactProblem3D
@@ -205,24 +203,28 @@ class ByCurves:
 
     # -- arcs ------------------------------------------------------------------------------------------------------
 
-    def made(self, limits: Deadline, tick: Tick | None) -> Made:
+    def made(self, limits: Deadline, tick: Tick | None) -> GraphData:
         """Arcs into which the curves are cut."""
         with within(limits):
             return self._made(tick, self.stop)
 
-    def ended(self, reason: StopReason) -> Made:
+    def ended(self, reason: StopReason) -> GraphData:
         """Arcs of the curves that were found."""
         return self._made(None, Stop(reason, self.nodes))
 
-    def _made(self, tick: Tick | None, stop: Stop | None) -> Made:
+    def _made(self, tick: Tick | None, stop: Stop | None) -> GraphData:
         """Vertices and arcs of all curves found; after an interruption while they were cut, of those cut by then."""
         graph = self._elements(tick, stop) if self.chains else None
         vertices, arcs = ([], []) if graph is None else graph.made()
         told, left_open = ([], []) if graph is None else (graph.reasons, graph.left_open)
         reasons, cut = [*self.refused, *([] if stop is None else [str(stop)])], len(self.cuts) == len(self.chains)
-        return Made(
-            vertices,
-            arcs,
+        return GraphData(
+            self.problem,
+            None,
+            self.interval,
+            "verified",
+            tuple(vertices),
+            tuple(arcs),
             (*reasons, *([] if reasons else self._sentences()), *told),
             GraphStats(
                 pieces=1 + sum(isinstance(record, CutPiece) for record in self.records),
