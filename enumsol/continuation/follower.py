@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING, Generic, TypeVar
 
 import numpy as np
 
-from enumsol.continuation.path_data import PathData, PathStatus, PointKind, Tangent
-from enumsol.continuation.recorder import SAME_POINT, Landmarks, PathRecorder, points_of
+from enumsol.continuation.path_data import PathStatus, PointKind, Tangent
+from enumsol.continuation.recorder import SAME_POINT, Landmarks, PathRecorder
 from enumsol.continuation.transitions import (
     FORWARD_TOLERANCE,
     RATE_TOLERANCE,
@@ -34,13 +34,13 @@ from enumsol.support.deadlines import keeping, look
 from enumsol.support.messages import counted
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Callable, Sequence
 
     from enumsol.continuation.newton import Start
-    from enumsol.support.array_types import Floats
+    from enumsol.support.array_types import Codes, Floats
     from enumsol.support.deadlines import Ending
 
-_Path = TypeVar("_Path", bound=PathData)
+_Path = TypeVar("_Path")
 #: How a path ended, and why in a sentence.
 _Stop = tuple[PathStatus, str]
 
@@ -84,28 +84,33 @@ class Follower(Generic[_Path]):
 
     Parameters
     ----------
-    kind : subclass of PathData
-        What is made of the points.
+    make : callable
+        Makes a path of its attributes.
     start : Start
     first : TangentPoint
         The start and the direction in which to leave it.
     sign : {+1, -1}
         Orientation kept along the path.
-    visited : sequence of PathData
+    visited : list of (x, codes, True)
+        Points of other paths (see Landmarks).
     """
 
     def __init__(
-        self, kind: type[_Path], start: Start, first: TangentPoint, sign: int, visited: Sequence[PathData] = ()
+        self,
+        make: Callable[..., _Path],
+        start: Start,
+        first: TangentPoint,
+        sign: int,
+        visited: Sequence[tuple[Floats, Codes, bool]] = (),
     ) -> None:
-        self._kind, self._smooth_path = kind, start.smooth_path
+        self._make, self._smooth_path = make, start.smooth_path
         self.equation, self.options, self.interval = start.equation, start.options, start.interval
         self.current, self.sign = first, sign
         self.h = self.options.h_init
         self._in_place, self._friction_ends = 0, False
         (low, high), margin, scale = self.interval, self.options.overshoot, self.equation.alpha_scale
         self._low, self._high = (low - margin) / scale, (high + margin) / scale
-        tolerance, others = self.options.transition_tolerance, list(points_of(self.equation, visited))
-        self._landmarks = Landmarks(self.equation, first, tolerance, others)
+        self._landmarks = Landmarks(self.equation, first, self.options.transition_tolerance, [*visited])
         self.record = PathRecorder(self.equation)
         self.record.add(first, PointKind.START)
 
@@ -129,7 +134,7 @@ class Follower(Generic[_Path]):
         return f"at alpha = {self.equation.alpha(self.record.last.x):g}; path.resume() continues"
 
     def _path(self, stop: _Stop) -> _Path:
-        return self._kind(
+        return self._make(
             **self.record.found(),
             status=stop[0],
             message=stop[1],

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
@@ -10,7 +11,7 @@ import numpy as np
 
 from enumsol.condensation.condensed import condensation_of, solved
 from enumsol.continuation.condensed_equation import CondensedEquation, DiscEquation
-from enumsol.continuation.path_data import ContinuationOptions, PathData
+from enumsol.continuation.path_data import ContinuationOptions
 from enumsol.continuation.scaled_equation import ParameterPath, SmoothPath
 from enumsol.errors import EnumsolError, InvalidArgumentError
 from enumsol.model.problem import ContactProblem, check_is_problem
@@ -23,8 +24,6 @@ from enumsol.support.array_arguments import real_array
 from enumsol.support.messages import counted
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
-
     from enumsol.continuation.scaled_equation import ScaledEquation
     from enumsol.model.problem3d import AnyProblem
     from enumsol.support.array_types import Alpha, AlphaLike, ArrayLike, Codes, Floats
@@ -128,9 +127,11 @@ class Start:
 def _start_values(start: object, tangential: tuple[int, ...], modes: int) -> tuple[float, Floats, Floats]:
     """alpha, the forces (m,) and rigid coordinates (modes,) of a start whose lambda_t has that shape."""
     values = (*_NAMES, *((_RIGID,) if modes else ()))
+    # a Path has these as well, of all its points
+    one = isinstance(start, tuple) or not isinstance(start, Sequence)
     if isinstance(start, tuple) and len(start) == len(values):
         alpha, *given = start
-    elif all(getattr(start, name, None) is not None for name in values) and not isinstance(start, PathData):
+    elif one and all(getattr(start, name, None) is not None for name in values):
         alpha, *given = (getattr(start, name) for name in values)
     else:
         found = f"a tuple of {len(start)}" if isinstance(start, tuple) else f"a {type(start).__name__}"

@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
-from dataclasses import fields
-from typing import TYPE_CHECKING, Any, Protocol
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, field, fields, replace
+from functools import cached_property
+from typing import TYPE_CHECKING, Any, Protocol, Self, overload
 
 import numpy as np
 
@@ -13,7 +16,7 @@ from enumsol.continuation.path_data import (
     ARRAYS,
     RIGID,
     ContinuationOptions,
-    PathData,
+    PathPoint,
     PathStats,
     PathStatus,
     PointKind,
@@ -24,25 +27,32 @@ from enumsol.continuation.transitions import ACTIVE_TOLERANCE, TangentPoint, adm
 from enumsol.errors import InvalidArgumentError
 from enumsol.model.statuses import ContactStatus
 from enumsol.roots.local_branch import LocalBranchTest
+from enumsol.roots.root import summary
 from enumsol.support.arguments import direction_value, file_path, one_of, row_number, shown
 from enumsol.support.files import read_arrays, reading, write_arrays
+from enumsol.support.immutable import Listed, Sealed, no_such_item
+from enumsol.support.messages import counted
 from enumsol.support.plotting import axes_or_none, checked_units, figure_of, in_units, kept, new_figure
 from enumsol.support.saved import Array, Maybe, check_kind, is_label, is_number
 
 if TYPE_CHECKING:
     import os
-    from collections.abc import Callable, Sequence
+    from collections.abc import Callable, Iterator
 
-    from enumsol.continuation.scaled_equation import SmoothPath
+    import pandas as pd
+
+    from enumsol.continuation.scaled_equation import ScaledEquation, SmoothPath
     from enumsol.model.problem3d import AnyProblem
-    from enumsol.support.array_types import AlphaLike
+    from enumsol.support.array_types import AlphaLike, Codes, Floats, Integers, NDArray
 
 
 #: Version of the files of paths.
 _FORMAT = 1
+#: Transitions that a printed path shows.
+_PRINTED_TRANSITIONS = 12
 
 
-def save_path(followed: PathData, path: str | os.PathLike[str]) -> None:
+def save_path(followed: Path, path: str | os.PathLike[str]) -> None:
     """Write the path to a .npz file; the problem and the callables of a smooth path are not in it."""
     report = {
         "kinds": followed.kinds,
@@ -140,7 +150,7 @@ class Drawn(Protocol):
 
 
 def draw_path(
-    path: PathData,
+    path: Path,
     graph: Drawn | None = None,
     *,
     node: int = 0,
@@ -218,7 +228,8 @@ def draw_path(
     return kept(figure_of(axes), file)
 
 
-class Path(PathData):
+@dataclass(frozen=True, eq=False, repr=False)
+class Path(Sequence[PathPoint], Sealed):
     """A followed branch of solutions: a sequence of its points.
 
     Attributes
@@ -261,6 +272,30 @@ class Path(PathData):
     >>> path.status, float(path.alpha[0]), float(path.alpha[-1])
     ('interval left', 1.0, 10.0)
     """
+
+    alpha: Floats
+    lambda_n: Floats
+    lambda_t: Floats
+    u_n: Floats
+    u_t: Floats
+    codes: NDArray[np.int8]
+    kinds: tuple[PointKind, ...]
+    steps: Floats
+    corrections: Integers
+    arclength: Floats
+    transitions: tuple[Transition, ...]
+    status: PathStatus
+    message: str
+    orientation: int
+    interval: tuple[float, float]
+    options: ContinuationOptions
+    next_step: float
+    stats: PathStats
+    node_ids: tuple[Any, ...]
+    _names: tuple[tuple[ContactStatus, ...], ...] = field(repr=False)
+    rigid_coordinates: Floats | None = None
+    _problem: AnyProblem | None = field(default=None, repr=False, compare=False)
+    _smooth_path: SmoothPath | None = field(default=None, repr=False, compare=False)
 
     plot = draw_path
     save = save_path
@@ -319,6 +354,139 @@ class Path(PathData):
         follower = Follower(Path, start, TangentPoint(start.x, codes, vector), self.orientation)
         follower.h = min(max(self.next_step, start.options.h_min), start.options.h_max)
         return self.joined(follower.run())
+
+    # -- a sequence of points ----------------------------------------------------------------------------------------
+
+    def __len__(self) -> int:
+        return len(self.alpha)
+
+    @overload
+    def __getitem__(self, item: int) -> PathPoint: ...
+    @overload
+    def __getitem__(self, item: slice) -> tuple[PathPoint, ...]: ...
+    def __getitem__(self, item: int | slice) -> PathPoint | tuple[PathPoint, ...]:
+        if isinstance(item, slice):
+            return tuple(self[k] for k in range(*item.indices(len(self))))
+        try:
+            k = range(len(self))[item]
+        except IndexError:
+            raise no_such_item(item, len(self), "point") from None
+        return PathPoint(
+            alpha=float(self.alpha[k]),
+            lambda_n=self.lambda_n[k],
+            lambda_t=self.lambda_t[k],
+            u_n=self.u_n[k],
+            u_t=self.u_t[k],
+            statuses=self._names[k],
+            kind=self.kinds[k],
+            rigid_coordinates=None if self.rigid_coordinates is None else self.rigid_coordinates[k],
+        )
+
+    @property
+    def points(self) -> tuple[PathPoint, ...]:
+        """All points."""
+        return Listed(self[:], "point")
+
+    @property
+    def selections(self) -> tuple[tuple[ContactStatus, ...], ...]:
+        """The statuses along the path, one entry per piece between transitions."""
+        return tuple(name for k, name in enumerate(self._names) if k == 0 or name != self._names[k - 1])
+
+    @cached_property
+    def folds(self) -> tuple[Transition, ...]:
+        """The transitions at which alpha turns back (after a vertical piece: its end), folds within a selection too."""
+        found, direction = [], 0
+        for transition in self.transitions:
+            if not transition.nodes:  # alpha turns back within a selection
+                found.append(transition)
+                direction = -direction
+                continue
+            for value in (transition.dalpha_before, transition.dalpha_after):
+                # a vertical piece: at a regular point it is well above this rounding
+                sign = 0 if abs(value) <= 1e-9 * self._alpha_scale else int(np.sign(value))
+                if sign and direction and sign != direction:
+                    found.append(transition)
+                direction = sign or direction
+        return tuple(found)
+
+    @property
+    def _alpha_scale(self) -> float:
+        return self.options.alpha_scale or 1.0
+
+    @property
+    def closed(self) -> bool:
+        """The path returned to its start."""
+        return self.status is PathStatus.CLOSED
+
+    # -- output ------------------------------------------------------------------------------------------------------
+
+    def to_frame(self) -> pd.DataFrame:
+        """Table of points: alpha, kind, step, corrections, arclength; of every node X lambda_n_X, .., status_X.
+
+        Of a body that nothing holds rigid_0, rigid_1, .. are the coordinates of its rigid displacement.
+
+        In 3D lambda_t1_X and lambda_t2_X take the place of lambda_t_X, and so for u_t.
+        X is the node's label, or its row number where two labels are the same text.
+        """
+        import pandas as pd
+
+        labels = [str(node) for node in self.node_ids]
+        nodes = labels if len(set(labels)) == len(labels) else range(len(labels))
+        columns: dict[str, Any] = {
+            "alpha": self.alpha,
+            "kind": [kind.value for kind in self.kinds],
+            "step": self.steps,
+            "corrections": self.corrections,
+            "arclength": self.arclength,
+        }
+        for quantity in ("lambda_n", "lambda_t", "u_n", "u_t"):
+            values = getattr(self, quantity)
+            axes = [("", values)] if values.ndim == 2 else [("1", values[..., 0]), ("2", values[..., 1])]
+            for axis, part in axes:
+                columns |= {f"{quantity}{axis}_{node}": column for node, column in zip(nodes, part.T, strict=True)}
+        if self.rigid_coordinates is not None:
+            columns |= {f"rigid_{mode}": column for mode, column in enumerate(self.rigid_coordinates.T)}
+        columns |= {f"status_{node}": [names[i].value for names in self._names] for i, node in enumerate(nodes)}
+        return pd.DataFrame(columns)
+
+    def joined(self, more: Self) -> Self:
+        """The path followed by one that starts at its end."""
+        shift = len(self) - 1
+        arrays: dict[str, Any] = {
+            name: np.concatenate([getattr(self, name), getattr(more, name)[1:]])
+            for name in (*ARRAYS, *([] if self.rigid_coordinates is None else [RIGID]))
+            if name != "arclength"
+        }
+        arclength = np.concatenate([self.arclength, self.arclength[-1] + more.arclength[1:]])
+        transitions = tuple(replace(item, point=item.point + shift) for item in more.transitions)
+        return replace(
+            more,
+            **arrays,
+            arclength=arclength,
+            kinds=self.kinds + more.kinds[1:],
+            transitions=self.transitions + transitions,
+            stats=self.stats + more.stats,
+            _names=self._names[:-1] + more._names,
+        )
+
+    def __repr__(self) -> str:
+        stats = self.stats
+        low, high = float(np.min(self.alpha)), float(np.max(self.alpha))
+        lines = [
+            f"Path with {counted(len(self), 'point')}, alpha from {low:.6g} to {high:.6g}",
+            f"  steps        {stats.accepted} accepted, {stats.rejected} rejected "
+            f"({stats.not_converged} not converged, {stats.refused} refused), "
+            f"{counted(stats.corrections, 'correction')}",
+            f"  transitions  {len(self.transitions)}, of them {counted(len(self.folds), 'fold')}",
+        ]
+        for item in self.transitions[:_PRINTED_TRANSITIONS]:
+            test = "" if item.local_test is None or item.local_test.exists else ", no local branch"
+            fold = ", fold" if item in self.folds else ""
+            lines.append(f"    alpha = {item.alpha:<12.8g} {summary(item.before)} -> {summary(item.after)}{fold}{test}")
+        if len(self.transitions) > _PRINTED_TRANSITIONS:
+            lines.append(f"    ... {len(self.transitions) - _PRINTED_TRANSITIONS} more")
+        lines.append(f"  ended        {self.message}")
+        return "\n".join(lines)
 
 
 class AmbiguousStart(InvalidArgumentError):  # noqa: N818 (reads as a state of the start)
@@ -408,7 +576,22 @@ def follow(
     chosen = _choose(first, direction, tangent)
     point = TangentPoint(first.x, chosen.codes, chosen.vector)
     sign = chosen.orientation or direction
-    return Follower(Path, first, point, sign, visited).run()
+    return Follower(Path, first, point, sign, list(_points_of(first.equation, visited))).run()
+
+
+def _points_of(equation: ScaledEquation, visited: Sequence[Path]) -> Iterator[tuple[Floats, Codes, bool]]:
+    """Starts, transition points and ends of other paths, with the statuses on both sides."""
+    for path in visited:
+        for k, kind in enumerate(path.kinds):
+            if kind is PointKind.STEP:
+                continue
+            forces = np.concatenate([path.lambda_n[k], path.lambda_t[k].ravel(order="F")])
+            rigid = None if path.rigid_coordinates is None else path.rigid_coordinates[k]
+            x = equation.point(float(path.alpha[k]), forces, rigid)
+            if not math.isfinite(float(np.sum(x))):
+                continue
+            for codes in {tuple(map(int, path.codes[at])) for at in (k, max(k - 1, 0))}:
+                yield x, codes, True
 
 
 def start_tangents(

@@ -1,31 +1,22 @@
-"""Settings of a continuation path, its points, transition points and folds, and how it ended."""
+"""Settings of a continuation, and the parts of a path: points, tangents, transition points, and how it ended."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import asdict, astuple, dataclass, field, fields, replace
-from functools import cached_property
+from dataclasses import asdict, astuple, dataclass, field, fields
 from operator import add
-from typing import TYPE_CHECKING, Any, Self, overload
-
-import numpy as np
+from typing import TYPE_CHECKING, Any
 
 from enumsol.errors import InvalidArgumentError
-from enumsol.roots.root import summary
 from enumsol.support.arguments import nonnegative_number, optional_callable, positive_integer, positive_number, shown
-from enumsol.support.immutable import Listed, Sealed, no_such_item
-from enumsol.support.messages import TextEnum, counted
+from enumsol.support.immutable import Sealed
+from enumsol.support.messages import TextEnum
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
+    from collections.abc import Callable, Sequence
 
-    import pandas as pd
-
-    from enumsol.continuation.scaled_equation import SmoothPath
-    from enumsol.model.problem3d import AnyProblem
     from enumsol.model.statuses import ContactStatus
     from enumsol.roots.local_branch import LocalBranchTest
-    from enumsol.support.array_types import Codes, Floats, Integers, NDArray
+    from enumsol.support.array_types import Codes, Floats
 
 
 @dataclass(frozen=True)
@@ -158,7 +149,6 @@ class ContinuationOptions:
         return cls(**{name: value for name, value in values.items() if name in known})
 
 
-_PRINTED_TRANSITIONS = 12
 #: The arrays of a path, one row per point.
 ARRAYS = ("alpha", "lambda_n", "lambda_t", "u_n", "u_t", "codes", "steps", "corrections", "arclength")
 #: Another one of a body that nothing holds.
@@ -286,165 +276,3 @@ class PathStats:
 
     def __add__(self, other: PathStats) -> PathStats:
         return PathStats(*map(add, astuple(self), astuple(other)))
-
-
-@dataclass(frozen=True, eq=False, repr=False)
-class PathData(Sequence[PathPoint], Sealed):
-    """The points of a path, its transition points and how it ended; for its attributes see Path."""
-
-    alpha: Floats
-    lambda_n: Floats
-    lambda_t: Floats
-    u_n: Floats
-    u_t: Floats
-    codes: NDArray[np.int8]
-    kinds: tuple[PointKind, ...]
-    steps: Floats
-    corrections: Integers
-    arclength: Floats
-    transitions: tuple[Transition, ...]
-    status: PathStatus
-    message: str
-    orientation: int
-    interval: tuple[float, float]
-    options: ContinuationOptions
-    next_step: float
-    stats: PathStats
-    node_ids: tuple[Any, ...]
-    _names: tuple[tuple[ContactStatus, ...], ...] = field(repr=False)
-    rigid_coordinates: Floats | None = None
-    _problem: AnyProblem | None = field(default=None, repr=False, compare=False)
-    _smooth_path: SmoothPath | None = field(default=None, repr=False, compare=False)
-
-    # -- a sequence of points ----------------------------------------------------------------------------------------
-
-    def __len__(self) -> int:
-        return len(self.alpha)
-
-    @overload
-    def __getitem__(self, item: int) -> PathPoint: ...
-    @overload
-    def __getitem__(self, item: slice) -> tuple[PathPoint, ...]: ...
-    def __getitem__(self, item: int | slice) -> PathPoint | tuple[PathPoint, ...]:
-        if isinstance(item, slice):
-            return tuple(self[k] for k in range(*item.indices(len(self))))
-        try:
-            k = range(len(self))[item]
-        except IndexError:
-            raise no_such_item(item, len(self), "point") from None
-        return PathPoint(
-            alpha=float(self.alpha[k]),
-            lambda_n=self.lambda_n[k],
-            lambda_t=self.lambda_t[k],
-            u_n=self.u_n[k],
-            u_t=self.u_t[k],
-            statuses=self._names[k],
-            kind=self.kinds[k],
-            rigid_coordinates=None if self.rigid_coordinates is None else self.rigid_coordinates[k],
-        )
-
-    @property
-    def points(self) -> tuple[PathPoint, ...]:
-        """All points."""
-        return Listed(self[:], "point")
-
-    @property
-    def selections(self) -> tuple[tuple[ContactStatus, ...], ...]:
-        """The statuses along the path, one entry per piece between transitions."""
-        return tuple(name for k, name in enumerate(self._names) if k == 0 or name != self._names[k - 1])
-
-    @cached_property
-    def folds(self) -> tuple[Transition, ...]:
-        """The transitions at which alpha turns back (after a vertical piece: its end), folds within a selection too."""
-        found, direction = [], 0
-        for transition in self.transitions:
-            if not transition.nodes:  # alpha turns back within a selection
-                found.append(transition)
-                direction = -direction
-                continue
-            for value in (transition.dalpha_before, transition.dalpha_after):
-                # a vertical piece: at a regular point it is well above this rounding
-                sign = 0 if abs(value) <= 1e-9 * self._alpha_scale else int(np.sign(value))
-                if sign and direction and sign != direction:
-                    found.append(transition)
-                direction = sign or direction
-        return tuple(found)
-
-    @property
-    def _alpha_scale(self) -> float:
-        return self.options.alpha_scale or 1.0
-
-    @property
-    def closed(self) -> bool:
-        """The path returned to its start."""
-        return self.status is PathStatus.CLOSED
-
-    # -- output ------------------------------------------------------------------------------------------------------
-
-    def to_frame(self) -> pd.DataFrame:
-        """Table of points: alpha, kind, step, corrections, arclength; of every node X lambda_n_X, .., status_X.
-
-        Of a body that nothing holds rigid_0, rigid_1, .. are the coordinates of its rigid displacement.
-
-        In 3D lambda_t1_X and lambda_t2_X take the place of lambda_t_X, and so for u_t.
-        X is the node's label, or its row number where two labels are the same text.
-        """
-        import pandas as pd
-
-        labels = [str(node) for node in self.node_ids]
-        nodes = labels if len(set(labels)) == len(labels) else range(len(labels))
-        columns: dict[str, Any] = {
-            "alpha": self.alpha,
-            "kind": [kind.value for kind in self.kinds],
-            "step": self.steps,
-            "corrections": self.corrections,
-            "arclength": self.arclength,
-        }
-        for quantity in ("lambda_n", "lambda_t", "u_n", "u_t"):
-            values = getattr(self, quantity)
-            axes = [("", values)] if values.ndim == 2 else [("1", values[..., 0]), ("2", values[..., 1])]
-            for axis, part in axes:
-                columns |= {f"{quantity}{axis}_{node}": column for node, column in zip(nodes, part.T, strict=True)}
-        if self.rigid_coordinates is not None:
-            columns |= {f"rigid_{mode}": column for mode, column in enumerate(self.rigid_coordinates.T)}
-        columns |= {f"status_{node}": [names[i].value for names in self._names] for i, node in enumerate(nodes)}
-        return pd.DataFrame(columns)
-
-    def joined(self, more: Self) -> Self:
-        """The path followed by one that starts at its end."""
-        shift = len(self) - 1
-        arrays: dict[str, Any] = {
-            name: np.concatenate([getattr(self, name), getattr(more, name)[1:]])
-            for name in (*ARRAYS, *([] if self.rigid_coordinates is None else [RIGID]))
-            if name != "arclength"
-        }
-        arclength = np.concatenate([self.arclength, self.arclength[-1] + more.arclength[1:]])
-        transitions = tuple(replace(item, point=item.point + shift) for item in more.transitions)
-        return replace(
-            more,
-            **arrays,
-            arclength=arclength,
-            kinds=self.kinds + more.kinds[1:],
-            transitions=self.transitions + transitions,
-            stats=self.stats + more.stats,
-            _names=self._names[:-1] + more._names,
-        )
-
-    def __repr__(self) -> str:
-        stats = self.stats
-        low, high = float(np.min(self.alpha)), float(np.max(self.alpha))
-        lines = [
-            f"Path with {counted(len(self), 'point')}, alpha from {low:.6g} to {high:.6g}",
-            f"  steps        {stats.accepted} accepted, {stats.rejected} rejected "
-            f"({stats.not_converged} not converged, {stats.refused} refused), "
-            f"{counted(stats.corrections, 'correction')}",
-            f"  transitions  {len(self.transitions)}, of them {counted(len(self.folds), 'fold')}",
-        ]
-        for item in self.transitions[:_PRINTED_TRANSITIONS]:
-            test = "" if item.local_test is None or item.local_test.exists else ", no local branch"
-            fold = ", fold" if item in self.folds else ""
-            lines.append(f"    alpha = {item.alpha:<12.8g} {summary(item.before)} -> {summary(item.after)}{fold}{test}")
-        if len(self.transitions) > _PRINTED_TRANSITIONS:
-            lines.append(f"    ... {len(self.transitions) - _PRINTED_TRANSITIONS} more")
-        lines.append(f"  ended        {self.message}")
-        return "\n".join(lines)

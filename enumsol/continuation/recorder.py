@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 import time
 from dataclasses import dataclass, field, replace
 from itertools import pairwise
@@ -22,9 +21,6 @@ from enumsol.continuation.transitions import (
 from enumsol.errors import TooLargeError
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Sequence
-
-    from enumsol.continuation.path_data import PathData
     from enumsol.continuation.scaled_equation import ScaledEquation
     from enumsol.roots.local_branch import LocalBranchTest
     from enumsol.support.array_types import Codes, Floats
@@ -82,7 +78,7 @@ class PathRecorder:
         self.stats = replace(self.stats, **{name: getattr(self.stats, name) + n for name, n in changes.items()})
 
     def found(self) -> dict[str, Any]:
-        """Attributes of a PathData with the points so far, by the names of its attributes."""
+        """Attributes of a Path with the points so far, by their names."""
         equation, p, points = self.equation, self.equation.p, [one.point for one in self.points]
         forces = np.array([equation.forces(point.x) for point in points])
         w = np.array([equation.displacements(point.x) for point in points])
@@ -191,18 +187,3 @@ class Landmarks:
         near = start.x + min(max(share, 0.0), 1.0) * chord
         x = smooth_newton(equation, point.codes, near, row, float(row @ point.x), self.tolerance)
         return x is not None and equation.norm(x - point.x) <= SAME_POINT
-
-
-def points_of(equation: ScaledEquation, visited: Sequence[PathData]) -> Iterator[tuple[Floats, Codes, bool]]:
-    """Starts, transition points and ends of other paths, with the statuses on both sides."""
-    for path in visited:
-        for k, kind in enumerate(path.kinds):
-            if kind is PointKind.STEP:
-                continue
-            forces = np.concatenate([path.lambda_n[k], path.lambda_t[k].ravel(order="F")])
-            rigid = None if path.rigid_coordinates is None else path.rigid_coordinates[k]
-            x = equation.point(float(path.alpha[k]), forces, rigid)
-            if not math.isfinite(float(np.sum(x))):
-                continue
-            for codes in {tuple(map(int, path.codes[at])) for at in (k, max(k - 1, 0))}:
-                yield x, codes, True
