@@ -159,7 +159,6 @@ def _below(alpha: Fraction) -> float:
     return value if value <= alpha else float(np.nextafter(value, -np.inf))
 
 
-_END: Any = object()
 #: Most boxes of a trace, and most parts of a box.
 _MOST_BOXES, _MOST_PARTS = 1000, 1000
 #: Conditions that vanish together where a node changes from one status to another: status, condition.
@@ -227,7 +226,7 @@ class ArcChecker:
         sides = (0,) if self.origin is None else (-1, 1)
         system = ArcSystem.of(self.problem, self.enclosure, *units)
         self._systems = {side: system.beside_zero(float(side)) for side in sides}
-        record, due = next(records, _END), len(self._due)
+        record, due = next(records, None), len(self._due)
         while isinstance(record, list):
             tell("selections followed", min(self.traces, due), due)
             self.traces += 1
@@ -267,7 +266,7 @@ class ArcChecker:
 
     # -- one trace -------------------------------------------------------------------------------------------------
 
-    def _trace(self, record: list[Any], records: Iterator[Any]) -> Any:
+    def _trace(self, record: Any, records: Iterator[Any]) -> Any:
         """Check a trace and follow its arcs; gives the record after it."""
         if len(record) != 5 or record[0] != "t" or type(record[4]) is not int or record[4] not in (-1, 0, 1):
             raise ValueError(f"{quoted(record)} begins no trace")
@@ -281,13 +280,13 @@ class ArcChecker:
         selection = BoxSelection(self, ArcSelection(self._systems[side], codes), side)
         follower = _Follower(self, selection.conditions, codes, side, (low, high))
         end, boxes = low, 0
-        record = next(records, _END)
+        record = next(records, None)
         while isinstance(record, list) and record and record[0] == "w":
             boxes += 1
             if boxes > _MOST_BOXES:
                 raise ValueError(f"it has more than {_MOST_BOXES} boxes")
             end = self._box(record, selection, follower, end)
-            record = next(records, _END)
+            record = next(records, None)
         if end != high:
             self.fail(f"the boxes of selection {shown(codes)} do not cover its trace")
         follower.finish()

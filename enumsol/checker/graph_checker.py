@@ -38,7 +38,6 @@ if TYPE_CHECKING:
 
 #: Of a piece's leaves beside arcs, at most so many times p^2.
 _MOST_BESIDE_ARCS = 64
-END = object()
 
 
 @dataclass
@@ -113,7 +112,7 @@ class GraphChecker(TreeWalker[EnclosedPiece]):
             cut = self._over_piece(x, y, roots, records)
             if cut:
                 waiting += [((x + y) / 2, y, cut), (x, (x + y) / 2, cut)]
-        record = next(records, END)
+        record = next(records, None)
         leaves = self.leaves - self._uncounted
         claim = {"pieces": self.pieces, "leaves": leaves, "selections": len(self._handed)}
         if self.data == "problem" and isinstance(record, dict) and "force" in record and "piece" not in record:
@@ -124,15 +123,14 @@ class GraphChecker(TreeWalker[EnclosedPiece]):
             self.bounded |= any(closed.bounded for closed in self._closed)
         elif self._closed:
             self.fail("pieces are said to be decided by their arcs, but there are none")
-        self._check_end(record, claim, "pieces", records)
+        self._check_counts(record, claim, "pieces", records)
 
-    def _check_end(self, record: object, claim: Mapping[str, int | None], what: str, records: Iterator[Any]) -> None:
+    def _check_counts(self, record: object, claim: Mapping[str, int | None], what: str, records: Iterator[Any]) -> None:
         """Compare the counts in the last record with those of what was read."""
         if not reading.same(record, claim):
             found = reading.quoted(record) if isinstance(record, (dict, list)) else "missing"
             self.fail(f"the counts at the end are {found}; the {what} give {claim!r}")
-        if next(records, END) is not END:
-            self.fail("records follow after the end of the proof")
+        self.check_end(records)
 
     @cached_property
     def enclosure(self) -> CondensedEnclosure:
@@ -154,7 +152,7 @@ class GraphChecker(TreeWalker[EnclosedPiece]):
 
     def _over_piece(self, x: Fraction, y: Fraction, roots: list[Codes], records: Iterator[Any]) -> list[Codes]:
         """Check the trees over the piece that is due; the assignments that they leave to its halves."""
-        number, record = self.pieces + 1, next(records, END)
+        number, record = self.pieces + 1, next(records, None)
         if not isinstance(record, dict):
             raise reading.RefusedError(f"piece {number} is missing")
         try:

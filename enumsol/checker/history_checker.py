@@ -23,8 +23,6 @@ if TYPE_CHECKING:
     from enumsol.checker.walk import Located
     from enumsol.support.array_types import Floats
 
-_END = object()
-
 
 @dataclass(frozen=True)
 class _DeclaredStep:
@@ -84,7 +82,9 @@ class HistoryChecker(ProofChecker):
             _ = self.problem.on_springs.enclosure  # made once, for all searches
             for number in range(count):
                 self._stage(number, count, records)
-            self._end(count, records)
+            if not same(next(records, None), {"stages": count}):
+                raise RefusedError("the end of the proof is missing")
+            self.check_end(records)
             complete, unique, within = self._conclusions()
         ok = not self.failures
         numbers = range(1, len(self.steps) + 1)
@@ -96,12 +96,6 @@ class HistoryChecker(ProofChecker):
         )
 
     # -- records ---------------------------------------------------------------------------------------------------
-
-    @staticmethod
-    def _end(count: int, records: Iterator[Any]) -> None:
-        """Refuse another end than the footer."""
-        if not same(next(records, _END), {"stages": count}) or next(records, _END) is not _END:
-            raise RefusedError("the end of the proof is missing, or something follows it")
 
     def _read_header(self) -> int:
         """Read the steps; the number of searches."""
@@ -126,7 +120,7 @@ class HistoryChecker(ProofChecker):
         return _DeclaredStep(rational_from(alpha), given, coefficients)
 
     def _stage(self, number: int, count: int, records: Iterator[Any]) -> None:
-        stage = self._said(number, count, next(records, _END))
+        stage = self._said(number, count, next(records, None))
         self.stages.append(stage)
         step = self.steps[stage.step - 1]
         problem = restarted(self._base(stage.step), stage.start)

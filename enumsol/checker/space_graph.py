@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any, cast
 
 import numpy as np
 
-from enumsol.checker.graph_checker import END, GraphChecker, interval_from
+from enumsol.checker.graph_checker import GraphChecker, interval_from
 from enumsol.checker.reports import GraphVerificationReport
 from enumsol.checker.walk import TreeCell
 from enumsol.condensation.data import exactly_at
@@ -101,7 +101,7 @@ class SpaceGraphChecker(GraphChecker):
         if self.progress is not None:
             self.progress(self.leaves)
         claim = {"curves": len(self.curves), "arcs": self.arcs, "leaves": self.leaves, "gaps": len(self.gaps)}
-        self._check_end(next(records, END), claim, "records", records)
+        self._check_counts(next(records, None), claim, "records", records)
 
     @cached_property
     def _tangents(self) -> list[int]:

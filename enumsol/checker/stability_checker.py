@@ -45,7 +45,6 @@ if TYPE_CHECKING:
     from enumsol.support.array_types import Floats
     from enumsol.trusted.motions_of_body import Setting
 
-_END = object()
 #: Certificates of one root: K(mu) is kept at the ends of all their ranges.
 _MOST_CERTIFICATES = 2_000
 
@@ -105,7 +104,7 @@ class StabilityChecker(ProofChecker):
             self._read_header()
             roots = self._roots(records)
             said, footer = self._said(records)
-            self._check_end(footer, said, records)
+            self._check_counts(footer, said, records)
             for own, root in zip(said, self._matched(said, roots), strict=True):
                 verdict, growth = self._verdict(own, root)
                 verdicts.append(verdict)
@@ -167,12 +166,11 @@ class StabilityChecker(ProofChecker):
                 raise RefusedError(f"more is said than of the {self.report.roots} roots")
         raise RefusedError("the end of the proof is missing")
 
-    def _check_end(self, footer: Any, said: list[_Said], records: Iterator[Any]) -> None:
+    def _check_counts(self, footer: Any, said: list[_Said], records: Iterator[Any]) -> None:
         counts = Counter(own.verdict for own in said)
         if not same(footer, {"roots": len(said), **{verdict: counts[verdict] for verdict in VERDICTS}}):
             raise RefusedError(f"the counts at the end, {quoted(footer)}, are not those of the records")
-        if next(records, _END) is not _END:
-            raise RefusedError("records follow after the end of the proof")
+        self.check_end(records)
 
     def _matched(self, said: list[_Said], roots: list[_Root]) -> list[_Root]:
         """The root that every record is about: the one to whose forces its own are near.

@@ -95,6 +95,12 @@ class ProofChecker:
         if len(self.failures) == MAX_FAILURES:
             raise RefusedError(f"the check ends after {MAX_FAILURES} failures")
 
+    @staticmethod
+    def check_end(records: Iterator[Any]) -> None:
+        """Raise RefusedError where there are more records than there should be."""
+        if next(records, _END) is not _END:
+            raise RefusedError("records follow after the end of the proof")
+
     @contextmanager
     def refusing(self) -> Iterator[None]:
         """Within this context what makes no sense, or data that cannot be enclosed, end the check as a failure."""
@@ -177,7 +183,7 @@ class TreeWalker(ProofChecker, ABC, Generic[Enclosed]):
         stack = [*roots[::-1]]
         while stack:
             cell = stack.pop()
-            record = next(records, _END)
+            record = next(records, None)
             if not isinstance(record, list) or not record:
                 raise RefusedError(f"{len(stack) + 1} subtrees are not accounted for: the tree breaks off")
             try:
@@ -392,12 +398,11 @@ class TreeChecker(TreeWalker[System], Generic[System, Root]):
     def _survey(self, records: Iterator[Any]) -> Any:
         """Walk the tree without a look at its leaves; gives the counts at the end."""
         leaves = self._all = sum(1 for _ in self._leaves(records, self._whole, survey=True))
-        footer = next(records, _END)
+        footer = next(records, None)
         if not isinstance(footer, dict) or footer.get("leaves") != leaves:
-            found = "missing" if footer is _END else quoted(footer)
+            found = "missing" if footer is None else quoted(footer)
             raise RefusedError(f"the counts at the end are {found}; the tree has {leaves} leaves")
-        if next(records, _END) is not _END:
-            raise RefusedError("records follow after the end of the proof")
+        self.check_end(records)
         return footer
 
     @cached_property
