@@ -21,7 +21,7 @@ from enumsol.proof import leaves as kinds
 from enumsol.proof.proof_file import fraction_text
 from enumsol.proof.reading import RefusedError, data_of, friction_at, rational_from, same, units_from
 from enumsol.proof.records import DeclaredForm, Limits, Tree
-from enumsol.trusted.at_alpha import JointRoot, VerifiedSelection, settled_selection, told_apart
+from enumsol.trusted.at_alpha import ClosedSolution, VerifiedSelection, settled_selection, told_apart
 from enumsol.trusted.floating_bounds import without_bound
 from enumsol.trusted.positions import certain_statuses
 from enumsol.trusted.status_rows import (
@@ -29,7 +29,7 @@ from enumsol.trusted.status_rows import (
     is_covering,
     row_signs,
 )
-from enumsol.trusted.uniqueness import ClosedSolution, same_solution
+from enumsol.trusted.uniqueness import same_solution
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
@@ -48,15 +48,15 @@ if TYPE_CHECKING:
 
 
 @dataclass
-class Checker(TreeChecker[EnclosedSystem, "VerifiedSelection | ClosedSolution | JointRoot"]):
+class Checker(TreeChecker[EnclosedSystem, VerifiedSelection]):
     """Checks one proof of a problem in 2D."""
 
     trees = Tree.PLANE, Tree.FLOATING_PLANE
 
     polytopes: list[Polytope] = field(default_factory=list)
-    closed: dict[tuple[int, ...], ClosedSolution | JointRoot] = field(default_factory=dict)
+    closed: dict[tuple[int, ...], ClosedSolution] = field(default_factory=dict)
     #: Roots that selections share, by the one in which all their nodes stick, and by how these slip.
-    shared: dict[tuple[Codes, tuple[tuple[int, int], ...]], JointRoot | None] = field(default_factory=dict)
+    shared: dict[tuple[Codes, tuple[tuple[int, int], ...]], ClosedSolution | None] = field(default_factory=dict)
 
     # -- header and tree -------------------------------------------------------------------------------------------
 
@@ -175,7 +175,7 @@ class Checker(TreeChecker[EnclosedSystem, "VerifiedSelection | ClosedSolution | 
         self.bounded |= self._rests_on_reach(codes, [])
         return "it holds a root" if self._hull(codes).points else None
 
-    def _wrongly_said(self, found: VerifiedSelection | ClosedSolution | JointRoot, said: EnclosureRecord) -> str | None:
+    def _wrongly_said(self, found: VerifiedSelection, said: EnclosureRecord) -> str | None:
         return said.refusal(found.force, self.force, found.index)
 
     def _only_reference(self, codes: Codes, said: kinds.OnlyReference) -> str | None:
@@ -216,20 +216,18 @@ class Checker(TreeChecker[EnclosedSystem, "VerifiedSelection | ClosedSolution | 
         self.closed[ball.core] = ball
         return self._only_below(ball, said.enclosure)
 
-    def _only_below(self, found: ClosedSolution | JointRoot, said: EnclosureRecord) -> str | None:
+    def _only_below(self, found: ClosedSolution, said: EnclosureRecord) -> str | None:
         """Look at what is said of a root that closes a subtree, or that selections share."""
         self._locate(found.core, found)
         return self._wrongly_said(found, said)
 
-    def _locate(self, name: Codes, ball: VerifiedSelection | ClosedSolution | JointRoot, codes: Codes = ()) -> None:
+    def _locate(self, name: Codes, ball: VerifiedSelection, codes: Codes = ()) -> None:
         del codes  # those that are certain follow from the balls
         if self.located is not None:
             mid, rad = ball.force.mid, ball.force.rad
             rad = np.where((mid == 0) & (rad == 0), 0.0, rad * self.force + TINY)
-            rigid = None if isinstance(ball, ClosedSolution) else ball.rigid
-            if rigid is not None:
-                rigid = rigid * Ball.exact(self.system.rigid_unit)
-            among = ball.possible if isinstance(ball, JointRoot) else None
+            rigid = None if ball.rigid is None else ball.rigid * Ball.exact(self.system.rigid_unit)
+            among = ball.possible if isinstance(ball, ClosedSolution) else None
             self._locate_by(name, Ball(mid * self.force, rad), ball.w, rigid, among)
 
     def _locate_by(self, name: Codes, forces: Ball, w: Ball, rigid: Ball | None, among: Among | None = None) -> None:

@@ -36,14 +36,13 @@ from enumsol.trusted.uniqueness import closed_solution, lone_root, numbers_of
 if TYPE_CHECKING:
     from enumsol.condensation.space_condensed import EnclosedSpace
     from enumsol.proof.reading import Row
-    from enumsol.trusted.at_alpha import JointRoot
+    from enumsol.trusted.at_alpha import ClosedSolution
     from enumsol.trusted.over_interval import EnclosedPiece
     from enumsol.trusted.quadratic_forms import EnclosedForm
     from enumsol.trusted.reference import PlaneReference
     from enumsol.trusted.space.pieces import AlphaPiece
     from enumsol.trusted.space.sector_margins import SlipForm
     from enumsol.trusted.space.space_uniqueness import LeafReference
-    from enumsol.trusted.uniqueness import ClosedSolution
 
     #: What multipliers bound.
     Bounded = EnclosedSystem | EnclosedForm | EnclosedPiece | SlipForm | AlphaPiece
@@ -229,7 +228,7 @@ class SharedRoot(Record):
         between = dict(self.slips)
         return tuple(STICK if i in between else code for i, code in enumerate(codes))
 
-    def holds(self, system: EnclosedSystem, codes: Codes) -> JointRoot | None:
+    def holds(self, system: EnclosedSystem, codes: Codes) -> ClosedSolution | None:
         """The root that the selections share; None where that is not proven (theory, section 14.9)."""
         return joint_root(system, self.core(codes), dict(self.slips))
 

@@ -28,7 +28,7 @@ from enumsol.proof.reading import (
 from enumsol.support.array_types import Codes, Floats
 from enumsol.trusted.over_interval import EnclosedPiece
 from enumsol.trusted.quadratic_forms import EnclosedForm
-from enumsol.trusted.reference import Reference
+from enumsol.trusted.reference import PlaneReference
 from enumsol.trusted.status_rows import UNDECIDED, refines
 
 if TYPE_CHECKING:
@@ -250,8 +250,8 @@ class DeclaredForm(Record):
         Of arcs over a piece in 2D, a tuple of their selections.
     numbers : array
         For a body that is held, in 2D the four rows of its multipliers one after the other, in 3D those of
-        ``sector_margins.SlipForm``, over the whole tree. For other bodies those of ``trusted.reference.Reference`` or
-        ``trusted.space.space_uniqueness.LeafReference``. Of arcs mu, kappa and nu of ``PieceNumbers``.
+        ``sector_margins.SlipForm``, over the whole tree. For other bodies those of ``PlaneReference.of`` or
+        ``trusted.space.space_uniqueness.LeafReference.of``. Of arcs mu, kappa and nu of ``PieceNumbers``.
     more : array
         At one alpha in 2D the weight of the equations; of a root balance and share, of arcs the degree, too.
     enclosure : EnclosureRecord or None
@@ -325,7 +325,7 @@ class DeclaredForm(Record):
     def form(self, system: EnclosedSystem | EnclosedPiece) -> Any:
         """The form of an assignment, or of a root; None where it is not proven to be definite.
 
-        An EnclosedForm or Reference, over a piece the piece with it, in 3D a SlipForm (of the whole tree) or
+        An EnclosedForm or PlaneReference, over a piece the piece with it, in 3D a SlipForm (of the whole tree) or
         LeafReference. Numbers of arcs are those of a ``PieceNumbers``.
 
         Raises
@@ -337,7 +337,7 @@ class DeclaredForm(Record):
             return system.with_form(self.numbers.reshape(4, -1))
         if system.tangents == 1:
             if not system.held:
-                return Reference.of(system, self.codes, self.numbers, *self.more.tolist())
+                return PlaneReference.of(system, self.codes, self.numbers, *self.more.tolist())
             return EnclosedForm.of(system, self.codes, self.numbers.reshape(4, -1), float(self.more[0]))
         from enumsol.trusted.space.sector_margins import SlipForm  # in 3D only
         from enumsol.trusted.space.space_uniqueness import LeafReference

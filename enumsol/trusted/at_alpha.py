@@ -8,7 +8,7 @@ in the search and in the checker alike; beside them is the test that several sel
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from itertools import product
 from typing import TYPE_CHECKING, Generic, NamedTuple, TypeVar
 
@@ -38,8 +38,8 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True)
-class EnclosedSolution:
-    """The one solution of some equations as balls, and the conditions that a root has to satisfy.
+class VerifiedSelection:
+    """The one solution of a selection whose matrix is proven regular for all data in the enclosure, as balls.
 
     Attributes
     ----------
@@ -49,11 +49,18 @@ class EnclosedSolution:
         w = g - S lambda, exact zeros where the statuses set them.
     slack : Ball
         Of the inequalities; a root needs all of them to be nonnegative.
+    index : int
+        Sign of the determinant of the matrix, of a body that nothing holds as on weak springs (theory, section 14.2):
+        the index of the root, if it is one.
+    rigid : Ball of shape (r,), or None
+        Of such a body, the coordinates q of its rigid displacement.
     """
 
     force: Ball
     w: Ball
     slack: Ball
+    index: int
+    rigid: Ball | None = None
 
     @property
     def is_root(self) -> bool:
@@ -66,21 +73,45 @@ class EnclosedSolution:
         return bool(np.any(self.slack.mid < -self.slack.rad))
 
 
+#: Radii of forces by the largest force, beyond which a solution is hardly placed.
+_WIDE = 1e-3
+
+
 @dataclass(frozen=True)
-class VerifiedSelection(EnclosedSolution):
-    """A selection whose matrix is proven regular for all data in the enclosure, and its one solution as balls.
+class ClosedSolution(VerifiedSelection):
+    """The one solution of several selections, as balls: below some statuses, or that they share.
+
+    Below a partial assignment it is that of a reduced problem (theory, section 6.11): ``index`` is the sign of the
+    determinant of the fixed nodes' equations, and ``slack`` the conditions of the fixed nodes and, of every sliding
+    one, the sign of its slip, unless it is open. Of selections that share it (theory, section 14.9) ``slack`` are the
+    conditions that hold strictly in all of them; in which of them it is may depend on the data.
 
     Attributes
     ----------
-    index : int
-        Sign of the determinant of the matrix, of a body that nothing holds as on weak springs (theory, section 14.2):
-        the index of the root, if it is one.
-    rigid : Ball of shape (r,), or None
-        Of such a body, the coordinates q of its rigid displacement.
+    core : status codes, UNDECIDED at free nodes, FORWARD or BACKWARD at those that slide
+        Of selections that share it that one in which all nodes between stick and slip stick.
+    possible : per node the final codes that may hold there; those of a fixed node that holds strictly are its own only
+    regular : VerifiedSelection or None
+        Its selection's solution, where its balls were taken for it.
     """
 
-    index: int
-    rigid: Ball | None = None
+    core: Codes = field(kw_only=True)
+    possible: tuple[frozenset[int], ...] = field(kw_only=True)
+    regular: VerifiedSelection | None = field(kw_only=True, default=None)
+
+    @property
+    def is_wide(self) -> bool:
+        """The balls hardly tell where it lies."""
+        return bool(np.max(self.force.rad, initial=0.0) > _WIDE * np.max(np.abs(self.force.mid), initial=0.0))
+
+    def has(self, codes: Codes) -> bool:
+        """True if it is the root of a selection, if that has one."""
+        return all(code in held for code, held in zip(codes, self.possible, strict=True))
+
+    @property
+    def slips(self) -> tuple[tuple[int, int], ...]:
+        """The nodes between stick and slip, and how they slip, of selections that share it."""
+        return tuple((i, max(held)) for i, held in enumerate(self.possible) if len(held) > 1)
 
 
 class _Solved(NamedTuple):
@@ -241,39 +272,7 @@ MOST_BETWEEN = 8
 _PAIRS = {SLIP_PLUS: {STICK: 2, SLIP_PLUS: 5}, SLIP_MINUS: {STICK: 3, SLIP_MINUS: 6}}
 
 
-@dataclass(frozen=True)
-class JointRoot:
-    """The one root that some selections have together, for all data; in which of them it is may depend on the data.
-
-    Attributes
-    ----------
-    core : codes of the selection in which all nodes between stick and slip stick
-    possible : per node the codes that may hold there
-    force, w : Ball of shape (2p,)
-        Of all of them.
-    index : int
-    rigid : Ball of shape (r,), or None
-        Of a body that nothing holds, the coordinates q of its rigid displacement.
-    """
-
-    core: Codes
-    possible: tuple[frozenset[int], ...]
-    force: Ball
-    w: Ball
-    index: int
-    rigid: Ball | None
-
-    def has(self, codes: Codes) -> bool:
-        """True if it is the root of a selection, if that has one."""
-        return all(code in held for code, held in zip(codes, self.possible, strict=True))
-
-    @property
-    def slips(self) -> tuple[tuple[int, int], ...]:
-        """The nodes between stick and slip, and how they slip."""
-        return tuple((i, max(held)) for i, held in enumerate(self.possible) if len(held) > 1)
-
-
-def joint_root(system: EnclosedSystem, core: Codes, slips: Mapping[int, int]) -> JointRoot | None:
+def joint_root(system: EnclosedSystem, core: Codes, slips: Mapping[int, int]) -> ClosedSolution | None:
     """The root that selections share, of which some nodes stick or slip; None where that is not proven.
 
     Parameters
@@ -285,7 +284,7 @@ def joint_root(system: EnclosedSystem, core: Codes, slips: Mapping[int, int]) ->
     if not 0 < len(slips) <= MOST_BETWEEN or any(core[i] != STICK or slips[i] not in _PAIRS for i in slips):
         return None
     possible = tuple(frozenset((code, slips.get(i, code))) for i, code in enumerate(core))
-    balls = list[VerifiedSelection]()
+    balls, strict = list[VerifiedSelection](), list[Ball]()
     for codes in product(*possible):
         ball = solve_selection(system, codes)
         if ball is None or (balls and ball.index != balls[0].index):
@@ -296,9 +295,11 @@ def joint_root(system: EnclosedSystem, core: Codes, slips: Mapping[int, int]) ->
         if not np.all(between | (ball.slack.mid > ball.slack.rad)):
             return None
         balls.append(ball)
+        strict.append(ball.slack[~between])
     force, w = (hull([getattr(ball, name) for ball in balls]) for name in ("force", "w"))
     rigid = [ball.rigid for ball in balls if ball.rigid is not None]
-    return JointRoot(core, possible, force, w, balls[0].index, hull(rigid) if rigid else None)
+    slack, moved = Ball.joined(*strict), hull(rigid) if rigid else None
+    return ClosedSolution(force, w, slack, balls[0].index, moved, core=core, possible=possible)
 
 
 Leaf = TypeVar("Leaf")

@@ -33,50 +33,16 @@ class PlaneReference(RootReference[int]):
     ----------
     at : Unknowns
         Which components d has: lambda_n of all nodes, lambda_t of those with friction.
+    root : VerifiedSelection or None
+        At one alpha the only root that the selection has, which is strict.
     """
 
     at: Unknowns
-
-    def allow(self, codes: Sequence[int], rows: Sequence[int], tight: Sequence[int]) -> bool:
-        """True if the first rows are equations, and the others nonnegative but not positive at the root."""
-        p, F = self.system.p, self.system.F
-        signs, own = (row_signs(np.array(given), F) for given in (codes, self.selection))
-        for row in (*rows, *tight):
-            kind, node = divmod(row, p)
-            if kind not in _SIGNS or (kind != PENETRATION and not F[node] > 0):
-                return False
-        for kind, node in (divmod(row, p) for row in rows):
-            if not signs[node, kind] == own[node, kind] == FREE:
-                return False
-        for kind, node in (divmod(row, p) for row in tight):
-            opposed = kind in _OPPOSITE and own[node, _OPPOSITE[kind]] == NONNEGATIVE
-            if signs[node, kind] < NONNEGATIVE or not (own[node, kind] == FREE or opposed):
-                return False
-        return True
-
-    def rows(self, rows: Sequence[int]) -> Ball:
-        """Rows as coefficients of the components of w that d has."""
-        found = np.zeros((len(rows), len(self.at.places)))
-        for k, row in enumerate(rows):
-            kind, node = divmod(row, self.system.p)
-            found[k, node if kind == PENETRATION else self.at.tangential[node]] = _SIGNS[kind]
-        return Ball.exact(found)
-
-
-@dataclass(frozen=True)
-class Reference(PlaneReference):
-    """The strict root of a selection, and its form.
-
-    Attributes
-    ----------
-    root : VerifiedSelection
-    """
-
-    root: VerifiedSelection
+    root: VerifiedSelection | None = None
 
     @classmethod
     def of(cls, system: EnclosedSystem, selection: Codes, weights: Floats, balance: float, share: float) -> Self | None:
-        """None where the selection holds no strict root, or its form is not proven definite where G d = 0.
+        """At one alpha; None where the selection holds no strict root, or its form is not definite for G d = 0.
 
         Parameters
         ----------
@@ -106,6 +72,31 @@ class Reference(PlaneReference):
             loaded = x, np.array(selection) != OPEN
             form = RootForm.of(S, G, numbers.multipliers(at), numbers.distances(at, x, w), loaded, balance, share)
             return None if form is None else cls(system, tuple(selection), form, at, root)
+
+    def allow(self, codes: Sequence[int], rows: Sequence[int], tight: Sequence[int]) -> bool:
+        """True if the first rows are equations, and the others nonnegative but not positive at the root."""
+        p, F = self.system.p, self.system.F
+        signs, own = (row_signs(np.array(given), F) for given in (codes, self.selection))
+        for row in (*rows, *tight):
+            kind, node = divmod(row, p)
+            if kind not in _SIGNS or (kind != PENETRATION and not F[node] > 0):
+                return False
+        for kind, node in (divmod(row, p) for row in rows):
+            if not signs[node, kind] == own[node, kind] == FREE:
+                return False
+        for kind, node in (divmod(row, p) for row in tight):
+            opposed = kind in _OPPOSITE and own[node, _OPPOSITE[kind]] == NONNEGATIVE
+            if signs[node, kind] < NONNEGATIVE or not (own[node, kind] == FREE or opposed):
+                return False
+        return True
+
+    def rows(self, rows: Sequence[int]) -> Ball:
+        """Rows as coefficients of the components of w that d has."""
+        found = np.zeros((len(rows), len(self.at.places)))
+        for k, row in enumerate(rows):
+            kind, node = divmod(row, self.system.p)
+            found[k, node if kind == PENETRATION else self.at.tangential[node]] = _SIGNS[kind]
+        return Ball.exact(found)
 
     def lies_below(self, codes: Sequence[int]) -> bool:
         """True if the root has the statuses of an assignment."""

@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from enumsol.arithmetic.balls import SAFE, TINY, UNIT, Ball, determinant_sign, gamma, solution
-from enumsol.trusted.at_alpha import EnclosedSolution, VerifiedSelection, solve_selection
+from enumsol.trusted.at_alpha import ClosedSolution, VerifiedSelection, solve_selection
 from enumsol.trusted.exclusion import exclusion_margin
 from enumsol.trusted.selection import Selection, Unknowns, row_values
 from enumsol.trusted.status_rows import (
@@ -228,41 +228,10 @@ class Components:
         return numbers.multipliers(self.at).moved(change)
 
 
-#: Radii of forces by the largest force, beyond which a solution is hardly placed.
-_WIDE = 1e-3
-
-
 def core_of(selection: Sequence[int], free: Sequence[int]) -> Codes:
     """The selection with its free nodes undecided."""
     chosen = set(free)
     return tuple(UNDECIDED if i in chosen else code for i, code in enumerate(selection))
-
-
-@dataclass(frozen=True)
-class ClosedSolution(EnclosedSolution):
-    """The one solution of a reduced problem as balls, in scaled units.
-
-    Attributes
-    ----------
-    core : status codes, UNDECIDED at the free nodes, FORWARD or BACKWARD at those that slide
-    possible : per node the final codes that may hold there; those of a fixed node that holds strictly are its own only
-    index : int
-        Sign of the determinant of the fixed nodes' equations: the index, if the conditions below hold strictly.
-    slack : Ball
-        The conditions of the fixed nodes, and of every sliding one: the sign of its slip, unless it is open.
-    regular : VerifiedSelection or None
-        Its selection's solution, where its balls were taken for it.
-    """
-
-    core: Codes
-    possible: tuple[frozenset[int], ...]
-    index: int
-    regular: VerifiedSelection | None = None
-
-    @property
-    def is_wide(self) -> bool:
-        """The balls hardly tell where it lies."""
-        return bool(np.max(self.force.rad, initial=0.0) > _WIDE * np.max(np.abs(self.force.mid), initial=0.0))
 
 
 def closed_solution(
@@ -428,7 +397,7 @@ class Reduced(Components):
         possible = tuple(
             frozenset((core[i],)) if fixed[i] else self._possible(i, values[:, i], radii[:, i]) for i in range(p)
         )
-        return ClosedSolution(force, w, slack, core, possible, self.sign)
+        return ClosedSolution(force, w, slack, self.sign, core=core, possible=possible)
 
     @staticmethod
     def _slides(code: int, values: Floats, radii: Floats) -> tuple[float, float]:

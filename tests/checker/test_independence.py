@@ -61,10 +61,10 @@ SHARED = {
     "trusted.arcs.precise": None,
     "trusted.arcs.taylor": {"AlphaFunctions", "ShortExpansion", "ball_of", "precision"},
     "trusted.positions": {"certain_statuses", "tangential_positions"},
-    "trusted.reference": {"PlaneReference", "Reference"},
+    "trusted.reference": {"PlaneReference"},
     "trusted.selection": None,
-    "trusted.uniqueness": {*("ClosedSolution", "closed_solution", "numbers_of", "only_solution", "same_solution")},
-    "trusted.at_alpha": {"JointRoot", "VerifiedSelection", "settled_selection", "solve_selection"},
+    "trusted.uniqueness": {*("closed_solution", "numbers_of", "only_solution", "same_solution")},
+    "trusted.at_alpha": {"ClosedSolution", "VerifiedSelection", "settled_selection", "solve_selection"},
     "trusted.motions_of_body": {
         *(
             "BodyMotions",

@@ -13,7 +13,7 @@ import enumsol
 from enumsol.arithmetic.balls import Ball
 from enumsol.search.reference_closer import proposed, rows_of
 from enumsol.search.solvers import Solvers
-from enumsol.trusted.reference import Reference
+from enumsol.trusted.reference import PlaneReference
 from enumsol.trusted.status_rows import FORBIDDEN, refines, row_signs
 from enumsol.trusted.uniqueness_forms import RootForm
 
@@ -174,7 +174,7 @@ def test_points_on_a_floor_have_one_root(pushes, held):
 def test_a_mode_that_nothing_holds_is_not_forgotten():
     """Of points that only press, the form has no mode, nor do gaps cost where they slide: one of them has to stick."""
     system = Solvers(bar_on_floor((0.0, 0.0)), 0, "verified", 1e-9).exclusions.system
-    reference = Reference.of(system, (1, 1), np.array([1.0] * 4 + [0.0] * 4), 16.0, 1.0)
+    reference = PlaneReference.of(system, (1, 1), np.array([1.0] * 4 + [0.0] * 4), 16.0, 1.0)
     assert np.all(reference.form.idle)
     for codes, rows in (((6, 6), []), ((5, 5), [8, 9]), ((6, 5), [9]), ((6, 1), [9])):
         assert not reference.is_only_root(codes, rows, [], system.reach)

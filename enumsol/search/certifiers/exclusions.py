@@ -15,7 +15,7 @@ from enumsol.search.reference_closer import reference_numbers
 from enumsol.trusted.at_alpha import settled_selection
 from enumsol.trusted.exclusion import Terms
 from enumsol.trusted.floating_bounds import motion_against, without_bound
-from enumsol.trusted.reference import Reference
+from enumsol.trusted.reference import PlaneReference
 from enumsol.trusted.selection import PENETRATION, SLIP_BACKWARD, SLIP_FORWARD
 from enumsol.trusted.status_rows import CONDITIONS, FORBIDDEN, FREE, row_signs
 
@@ -99,7 +99,7 @@ class Exclusions:
     ) -> None:
         self.rests_on_reach, self._within = rests_on_reach, within
         self.system, self.free = enclosed, enclosed if enclosed.held else without_bound(enclosed)
-        self._references: dict[Codes, Reference | None] = {}
+        self._references: dict[Codes, PlaneReference | None] = {}
         #: How the forms of roots are declared, by their selections.
         self.declared: dict[Codes, DeclaredForm] = {}
 
@@ -144,19 +144,21 @@ class Exclusions:
                 return None
         return (NoRoot(), not self.system.held) if none else None
 
-    def reference(self, selection: Codes) -> Reference | None:
+    def reference(self, selection: Codes) -> PlaneReference | None:
         """The form of a root, if one is proven definite."""
         if selection not in self._references:
             self._references[selection] = None
             for weights, *more in reference_numbers(self.system, selection):
-                found = Reference.of(self.system, selection, weights, *more)
+                found = PlaneReference.of(self.system, selection, weights, *more)
                 if found is not None:
                     self.declared[selection] = DeclaredForm(selection, weights, np.array(more))
                     self._references[selection] = found
                     break
         return self._references[selection]
 
-    def only_root(self, codes: Codes, reference: Reference, proposal: OnlyReference, *, within: bool) -> bool | None:
+    def only_root(
+        self, codes: Codes, reference: PlaneReference, proposal: OnlyReference, *, within: bool
+    ) -> bool | None:
         """True if the bound is needed for no other root to lie below an assignment; None if that is not proven."""
         for system in (self.free, self.system)[: 2 if within else 1]:
             if proposal.holds(reference, codes, system.reach):

@@ -28,7 +28,7 @@ if TYPE_CHECKING:
     from enumsol.selections.rational_selections import ExactSelections, Form
     from enumsol.support.array_types import Codes, Floats, Indices
     from enumsol.trusted.at_alpha import VerifiedSelection
-    from enumsol.trusted.reference import Reference
+    from enumsol.trusted.reference import PlaneReference
 
 
 _NEWTON_STEPS = 8
@@ -96,11 +96,13 @@ class ExactCertifier(Certifier):
             self.bounded = self._selections.rests_on_reach(codes, found)
         return found
 
-    def reference(self, selection: Codes) -> Reference | None:
+    def reference(self, selection: Codes) -> PlaneReference | None:
         """The form of a root of a body that nothing holds, if one is proven definite."""
         return None if self._exclusions is None else self._exclusions.reference(selection)
 
-    def only_root(self, codes: Codes, reference: Reference, proposal: OnlyReference) -> list[SelectionSolution] | None:
+    def only_root(
+        self, codes: Codes, reference: PlaneReference, proposal: OnlyReference
+    ) -> list[SelectionSolution] | None:
         """The roots below an assignment, that of a form or none; None if that is not proven."""
         exclusions = self._exclusions
         needs = None if exclusions is None else exclusions.only_root(codes, reference, proposal, within=self.bounded)

@@ -20,10 +20,10 @@ from enumsol.search.certifiers.exclusions import proven
 from enumsol.search.fathoming import propose, without_load
 from enumsol.search.reduction import NEAR
 from enumsol.selections.solution import SelectionSolution
-from enumsol.trusted.at_alpha import JointRoot, VerifiedSelection, settled_selection, solve_selection
+from enumsol.trusted.at_alpha import ClosedSolution, VerifiedSelection, settled_selection, solve_selection
 from enumsol.trusted.exclusion import Terms
 from enumsol.trusted.status_rows import CONDITIONS as ROWS, FREE, NONNEGATIVE, SLIP_MINUS, SLIP_PLUS, row_signs
-from enumsol.trusted.uniqueness import ClosedSolution, closed_solution, same_solution
+from enumsol.trusted.uniqueness import closed_solution, same_solution
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
@@ -36,7 +36,7 @@ if TYPE_CHECKING:
     from enumsol.search.reduction import Point, Proposal
     from enumsol.support.array_types import Codes, Floats, Indices
     from enumsol.trusted.quadratic_forms import EnclosedForm
-    from enumsol.trusted.reference import Reference
+    from enumsol.trusted.reference import PlaneReference
 
 
 _ROW_NAMES = {
@@ -304,18 +304,18 @@ class VerifiedCertifier(protocol.Certifier):
         self._leaf(leaves.UndecidedRecord(reason))
         return protocol.UndecidedPart(codes, reason, hint, examined=True)
 
-    def _ball(self, found: VerifiedSelection | ClosedSolution | JointRoot) -> EnclosureRecord:
+    def _ball(self, found: VerifiedSelection) -> EnclosureRecord:
         """Enclosure of a root, in the problem's units."""
         return records.EnclosureRecord.around(found.force, self._scaled.force, found.index, protocol.WIDEN)
 
     # -- a body that nothing holds (theory, section 14) ----------------------------------------------------------------
 
-    def reference(self, selection: Codes) -> Reference | None:
+    def reference(self, selection: Codes) -> PlaneReference | None:
         """The form of a root, if one is proven definite."""
         return None if self._exclusions is None else self._exclusions.reference(selection)
 
     def only_root(
-        self, codes: Codes, reference: Reference, proposal: leaves.OnlyReference
+        self, codes: Codes, reference: PlaneReference, proposal: leaves.OnlyReference
     ) -> list[SelectionSolution] | None:
         """The roots below an assignment, that of a form or none; None if that is not proven."""
         exclusions = self._exclusions
@@ -329,13 +329,14 @@ class VerifiedCertifier(protocol.Certifier):
         back = self._back(selection, lambda: exclusions.declared[selection])
         leaf = replace(proposal, back=back)
         if reference.lies_below(codes):
+            assert reference.root is not None
             return [self._regular(selection, reference.root, lambda said: replace(leaf, enclosure=said))]
         self._leaf(leaf)
         return []
 
     def _shared(self, codes: Codes, ball: VerifiedSelection | None) -> SelectionSolution | None:
         """The root that a selection may share with others, some nodes being between stick and slip."""
-        shared = [known for known in self._verified.values() if isinstance(known, JointRoot)]
+        shared = [known for known in self._verified.values() if isinstance(known, ClosedSolution)]
         root = next((known for known in shared if known.has(codes)), None)
         if root is None:
             slips = None if ball is None else _between(codes, ball)
