@@ -337,10 +337,10 @@ class ArcChecker:
         )
 
         if not affordable(self.problem):
-            raise ValueError("a box in many digits belongs to a problem that is too large for it")
+            raise RefusedError("a box in many digits belongs to a problem that is too large for it")
         system = system_in_many_digits(self.problem)
         if system is None:
-            raise ValueError("A is positive definite only within rounding")
+            raise RefusedError("A is positive definite only within rounding")
         return system
 
     def loose_end(self, codes: Codes, alpha: Fraction) -> None:

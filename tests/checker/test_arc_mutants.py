@@ -350,6 +350,19 @@ def test_extreme_and_senseless_numbers_are_refused(value):
         assert not with_boxes(["w", 0.0, 10.0, 0, [["e", 10.0, 1, 0, 1, first, value]]])
 
 
+def test_bounds_as_fractions_of_a_problem_without_many_digits_are_refused(monkeypatch):
+    """They are looked at after all traces, together with others."""
+    problem, records, _, _ = original("triangle")
+    records = copied(records)
+    events = [part for k in of_kind(records, "w") for part in records[k][4] if part[0] == "e"]
+    for part in events:
+        part[5:7] = [str(Fraction(bound)) for bound in part[5:7]]
+    assert events
+    assert verify(problem, proof_of(records)).complete
+    monkeypatch.setattr("enumsol.trusted.arcs.precise.affordable", lambda _: False)
+    assert "too large for it" in why_refused(problem, records)
+
+
 def test_boxes_without_parts_are_refused():
     last = ["w", 0.0, 10.0, 0, [["h", 10.0, 1]]]
     assert with_boxes(last)
