@@ -17,7 +17,16 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from enumsol.checker.arc_boxes import Boxes, BoxSelection, alpha_number, check_entries, inside, shown
+from enumsol.checker.arc_boxes import (
+    Boxes,
+    ClaimedArc,
+    ClaimedEvent,
+    ClaimedTrace,
+    alpha_number,
+    check_entries,
+    inside,
+    shown,
+)
 from enumsol.proof.leaves import OnlyReference, Unbalanced
 from enumsol.proof.reading import RefusedError, names_only, quoted, same, units_from
 from enumsol.support.deadlines import tell
@@ -37,48 +46,6 @@ if TYPE_CHECKING:
     from enumsol.support.array_types import Codes
 
     Span = tuple[Fraction, Fraction, int]
-
-
-@dataclass(eq=False)
-class ClaimedEvent:
-    """A point at which one condition of a selection vanishes."""
-
-    codes: tuple[int, ...]
-    side: int
-    condition: tuple[int, int]
-    part: tuple[Fraction, Fraction]
-    zero: tuple[Fraction, Fraction]
-    rising: bool
-    index: int
-    partners: list[ClaimedEvent]
-
-    @property
-    def bound(self) -> bool:
-        """True if it is the rigid displacement that reaches a bound there."""
-        return self.condition[0] >= len(self.codes)
-
-
-@dataclass(eq=False)
-class ClaimedArc:
-    """Interval over which a trace shows a root of its selection at every alpha.
-
-    Attributes
-    ----------
-    codes : status codes
-    side : int
-        Of the alpha at which g vanishes.
-    low, high : Fraction
-        It holds from here to there at least.
-    tail, head : ClaimedEvent or None
-        Where it begins, and where it ends.
-    """
-
-    codes: tuple[int, ...]
-    side: int
-    low: Fraction
-    high: Fraction
-    tail: ClaimedEvent | None = None
-    head: ClaimedEvent | None = None
 
 
 @dataclass(eq=False)
@@ -277,22 +244,21 @@ class ArcChecker:
             raise ValueError("its selection does not survive there, or the trace is repeated")
         self._due.remove(due)
         codes = due[0]
-        selection = BoxSelection(self, ArcSelection(self._systems[side], codes), side)
-        follower = _Follower(self, selection.conditions, codes, side, (low, high))
+        trace = ClaimedTrace(self, ArcSelection(self._systems[side], codes), side, (low, high))
         end, boxes = low, 0
         record = next(records, None)
         while isinstance(record, list) and record and record[0] == "w":
             boxes += 1
             if boxes > _MOST_BOXES:
                 raise ValueError(f"it has more than {_MOST_BOXES} boxes")
-            end = self._box(record, selection, follower, end)
+            end = self._box(record, trace, end)
             record = next(records, None)
         if end != high:
             self.fail(f"the boxes of selection {shown(codes)} do not cover its trace")
-        follower.finish()
+        trace.finish()
         return record
 
-    def _box(self, record: list[Any], selection: BoxSelection, follower: _Follower, start: Fraction) -> Fraction:
+    def _box(self, record: list[Any], trace: ClaimedTrace, start: Fraction) -> Fraction:
         """Follow the arcs through the parts of a box, and keep what they say; the end of the last one."""
         if len(record) != 5 or type(record[3]) is not int or record[3] not in (0, 1) or not isinstance(record[4], list):
             raise ValueError(f"{quoted(record)} is not a box")
@@ -302,16 +268,16 @@ class ArcChecker:
         end: Any = record[1]
         said: list[tuple[list[Any], Any, Any]] = []
         for part in record[4]:
-            check_entries(part, len(selection.conditions))
+            check_entries(part, len(trace.plain.rows.conditions))
             before, end = end, part[1]
             first, last = alpha_number(before), alpha_number(end)
             if not first < last <= high:
                 raise ValueError("the parts of a box are not in order")
             if part[0] != "u":
                 said.append((part, before, end))
-            follower.part(part[0], part, (first, last))
+            trace.part(part[0], part, (first, last))
         if said:
-            self._boxes.add(selection, record[1], record[2], said, precise=bool(record[3]))
+            self._boxes.add(trace, record[1], record[2], said, precise=bool(record[3]))
         return alpha_number(end)
 
     # -- all of them -----------------------------------------------------------------------------------------------
@@ -377,69 +343,6 @@ class ArcChecker:
                 self.fail(f"an event of {where} has {len(event.partners)} partners")
             else:
                 self.open += 1  # bounds too wide to find the partner, or it was left open
-
-
-@dataclass
-class _Follower:
-    """The arcs of one trace, from left to right."""
-
-    checker: ArcChecker
-    conditions: tuple[tuple[int, int], ...]
-    codes: Codes
-    side: int
-    ends: tuple[Fraction, Fraction]
-    _index: int = 0
-    _first: bool = True
-    _open: bool = False
-    _arc: ClaimedArc | None = None
-
-    def part(self, kind: str, part: list[Any], ends: tuple[Fraction, Fraction]) -> None:
-        """Go on through a part."""
-        if kind == "u":
-            if not self._open:  # parts that touch are one interval
-                self.checker.open += 1
-            self._arc = None
-        elif kind == "n":
-            if self._arc is not None:
-                self.checker.loose_end(self.codes, ends[0])
-            self._arc = None
-        else:
-            self._present(kind, part, ends)
-        self._open, self._first = kind == "u", False
-
-    def _present(self, kind: str, part: list[Any], ends: tuple[Fraction, Fraction]) -> None:
-        """A part in which the selection holds somewhere."""
-        event = None
-        if kind == "e":
-            zero = (alpha_number(part[5]), alpha_number(part[6]))
-            condition = self.conditions[part[3]]
-            event = ClaimedEvent(self.codes, self.side, condition, ends, zero, part[4] == 1, part[2], [])
-            self.checker.events.append(event)
-        rising = event is not None and event.rising
-        if rising and self._arc is not None:
-            self.checker.loose_end(self.codes, ends[0])
-        if not rising and self._arc is None:
-            starts = self._first and self.checker.end_at(self.ends[0], self.side, upper=False)
-            if not starts and not self._open:
-                self.checker.loose_end(self.codes, ends[0])
-            self._arc = ClaimedArc(self.codes, self.side, ends[0], ends[0])
-            self.checker.arc(self._arc, part[2], self.side if starts else None)
-        elif event is not None and rising:
-            self._arc = ClaimedArc(self.codes, self.side, event.zero[1], event.zero[1], event)
-            self.checker.arc(self._arc, part[2], None)
-        elif part[2] != self._index:
-            self.checker.loose_end(self.codes, ends[0])
-        self._index = part[2]
-        assert self._arc is not None
-        self._arc.high = ends[1]
-        if event is not None and not rising:
-            self._arc.high, self._arc.head = event.zero[0], event
-            self._arc = None
-
-    def finish(self) -> None:
-        """The end of the trace."""
-        if self._arc is not None and not self.checker.end_at(self.ends[1], self.side, upper=True):
-            self.checker.loose_end(self.codes, self.ends[1])
 
 
 def _is_next(value: Fraction, end: Fraction) -> bool:

@@ -124,14 +124,16 @@ class EnclosedForm(QuadraticForm):
         mu, nu, alpha and beta of every node.
     weight : float
         That of the equations.
-    F_rad : (p,) array
-        As of the system.
     """
 
     codes: tuple[int, ...]
     multipliers: Floats
     weight: float
-    F_rad: Floats
+
+    @property
+    def F_rad(self) -> Floats:  # noqa: N802 (the field's letter)
+        """Radius of F, that of the system."""
+        return self.system.F_rad
 
     @classmethod
     def of(cls, system: EnclosedSystem, codes: Sequence[int], multipliers: Floats, weight: float) -> EnclosedForm:
@@ -159,7 +161,7 @@ class EnclosedForm(QuadraticForm):
         H = 0.5 * (form.mid + form.mid.T)
         H_rad = (0.5 * (form.rad + form.rad.T) + 2 * UNIT * np.abs(H)) * SAFE
         constant = float(k.mid[0, 0]), float(k.rad[0, 0])
-        return cls(system, H, H_rad, h.mid, h.rad, *constant, tuple(codes), multipliers, weight, system.F_rad)
+        return cls(system, H, H_rad, h.mid, h.rad, *constant, tuple(codes), multipliers, weight)
 
 
 def energy_bounds(
