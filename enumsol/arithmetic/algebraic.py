@@ -294,20 +294,29 @@ class NumberFieldElement:
     Parameters
     ----------
     poly : fmpq_poly
-    field : NumberField
+    alpha : CriticalAlpha, irrational
+    modulus : fmpq_poly
+        Its minimal polynomial.
     """
 
-    __slots__ = ("field", "poly")
+    __slots__ = ("alpha", "modulus", "poly")
     __hash__ = None  # type: ignore[assignment]
 
-    def __init__(self, poly: fmpq_poly, field: NumberField) -> None:
-        self.poly, self.field = poly, field
+    def __init__(self, poly: fmpq_poly, alpha: CriticalAlpha, modulus: fmpq_poly) -> None:
+        self.poly, self.alpha, self.modulus = poly, alpha, modulus
 
     def _of(self, value: Number) -> fmpq_poly:
         return value.poly if isinstance(value, NumberFieldElement) else fmpq_poly([value])
 
     def _new(self, poly: fmpq_poly) -> NumberFieldElement:
-        return NumberFieldElement(poly, self.field)
+        return NumberFieldElement(poly, self.alpha, self.modulus)
+
+    def _inverse(self, poly: fmpq_poly) -> fmpq_poly:
+        """The inverse of a polynomial; ZeroDivisionError where it is zero."""
+        if poly.is_zero():
+            raise ZeroDivisionError("division by zero in a number field")
+        common, s, _ = poly.xgcd(self.modulus)
+        return s / common[0] % self.modulus
 
     def __add__(self, other: Number) -> NumberFieldElement:
         return self._new(self.poly + self._of(other))
@@ -319,13 +328,13 @@ class NumberFieldElement:
         return self._new(self._of(other) - self.poly)
 
     def __mul__(self, other: Number) -> NumberFieldElement:
-        return self._new(self.poly * self._of(other) % self.field.modulus)
+        return self._new(self.poly * self._of(other) % self.modulus)
 
     def __truediv__(self, other: Number) -> NumberFieldElement:
-        return self._new(self.poly * self.field.inverse(self._of(other)) % self.field.modulus)
+        return self._new(self.poly * self._inverse(self._of(other)) % self.modulus)
 
     def __rtruediv__(self, other: Number) -> NumberFieldElement:
-        return self._new(self._of(other) * self.field.inverse(self.poly) % self.field.modulus)
+        return self._new(self._of(other) * self._inverse(self.poly) % self.modulus)
 
     __radd__, __rmul__ = __add__, __mul__
 
@@ -334,7 +343,7 @@ class NumberFieldElement:
 
     def sign(self) -> int:
         """Sign of the real number."""
-        return 0 if self.poly.is_zero() else self.field.alpha.sign_of(integer_polynomial(self.poly))
+        return 0 if self.poly.is_zero() else self.alpha.sign_of(integer_polynomial(self.poly))
 
     def _minus(self, other: Number) -> NumberFieldElement:
         return self._new(self.poly - self._of(other))
@@ -359,47 +368,16 @@ class NumberFieldElement:
 
     def __float__(self) -> float:
         # a narrow interval bounds the error; the value is rounded once
-        self.field.alpha.narrow(fmpq(1, 2**400))
-        return float(to_fraction(self.poly((self.field.alpha.lo + self.field.alpha.hi) / 2)))
-
-
-class NumberField:
-    """The field Q(alpha) of an irrational critical alpha.
-
-    Parameters
-    ----------
-    alpha : CriticalAlpha
-    """
-
-    def __init__(self, alpha: CriticalAlpha) -> None:
-        self.alpha = alpha
-        self.modulus = fmpq_poly(alpha.minimal_polynomial())
-
-    @property
-    def generator(self) -> NumberFieldElement:
-        """Alpha itself."""
-        return NumberFieldElement(fmpq_poly([0, 1]) % self.modulus, self)
-
-    def inverse(self, poly: fmpq_poly) -> fmpq_poly:
-        """The inverse of a polynomial modulo the minimal polynomial.
-
-        Raises
-        ------
-        ZeroDivisionError
-            The polynomial is zero.
-        """
-        if poly.is_zero():
-            raise ZeroDivisionError("division by zero in a number field")
-        common, s, _ = poly.xgcd(self.modulus)
-        return s / common[0] % self.modulus
+        self.alpha.narrow(fmpq(1, 2**400))
+        return float(to_fraction(self.poly((self.alpha.lo + self.alpha.hi) / 2)))
 
 
 def exact_value(alpha: CriticalAlpha) -> Any:
     """The number as an element of an exact ordered field: an fmpq, or a NumberFieldElement when it is irrational."""
     if not alpha.is_rational:
-        field = NumberField(alpha)
+        modulus = fmpq_poly(alpha.minimal_polynomial())
         if not alpha.is_rational:
-            return field.generator
+            return NumberFieldElement(fmpq_poly([0, 1]) % modulus, alpha, modulus)
     return alpha.lo
 
 

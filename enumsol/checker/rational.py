@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from fractions import Fraction
 from itertools import combinations
 from math import comb
-from typing import TYPE_CHECKING, Any, Protocol
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from flint import fmpq, fmpq_mat
@@ -266,20 +266,6 @@ class HullTooLargeError(ValueError):
     """A root set has more than MAX_CANDIDATES candidate vertices."""
 
 
-class LinearConditions(Protocol):
-    """Equations and inequalities of selections, as of a RationalSystem."""
-
-    @property
-    def size(self) -> int:
-        """Numbers of a point."""
-
-    def equations(self, codes: Sequence[int]) -> tuple[Any, Sequence[Any]]:
-        """Matrix and right-hand side."""
-
-    def conditions(self, codes: Sequence[int], point: list[Any]) -> Sequence[Any]:
-        """Values of the inequalities at a point, which must not be negative; affine in the point."""
-
-
 @dataclass(frozen=True)
 class Hull:
     """The points that solve one selection, or several at once.
@@ -295,7 +281,7 @@ class Hull:
     dimension: int
 
 
-def hull_of_selections(system: LinearConditions, *selections: Sequence[int]) -> Hull:
+def hull_of_selections(system: RationalSystem | _Shares, *selections: Sequence[int]) -> Hull:
     """The root set that the given selections have in common, a polytope.
 
     It is bounded, and therefore the hull of its vertices, because S is positive definite (theory, section 5.1), and
@@ -326,7 +312,9 @@ def hull_of_selections(system: LinearConditions, *selections: Sequence[int]) -> 
     return Hull(sorted(found), _dimension(sorted(found)))
 
 
-def _solution_set(system: LinearConditions, selections: Sequence[Sequence[int]]) -> tuple[list[Any], list[Any]] | None:
+def _solution_set(
+    system: RationalSystem | _Shares, selections: Sequence[Sequence[int]]
+) -> tuple[list[Any], list[Any]] | None:
     """A point that solves all equations and a basis of their kernel, or None if they contradict each other."""
     size = system.size
     table = []
