@@ -24,7 +24,7 @@ from enumsol.proof import leaves as kinds, reading
 from enumsol.proof.records import CutPiece, Limits, Tree
 from enumsol.support.deadlines import tell
 from enumsol.trusted.exclusion import Leaves, exclusion_margins
-from enumsol.trusted.over_interval import EnclosedPiece, PieceNumbers, as_computed
+from enumsol.trusted.over_interval import EnclosedPiece, PieceNumbers
 from enumsol.trusted.status_rows import UNDECIDED, is_covering
 
 if TYPE_CHECKING:
@@ -135,7 +135,8 @@ class GraphChecker(TreeWalker[EnclosedPiece]):
     @cached_property
     def enclosure(self) -> CondensedEnclosure:
         """Balls for what is certified; only exclusions need them."""
-        return as_computed(self.problem) if self.data == "condensed" else CondensedEnclosure.from_problem(self.problem)
+        of = CondensedEnclosure.as_computed if self.data == "condensed" else CondensedEnclosure.from_problem
+        return of(self.problem)
 
     def _read_header(self) -> tuple[Fraction, Fraction]:
         self.data = reading.data_of(self.header, self.problem, "graph")

@@ -208,6 +208,13 @@ class CondensedEnclosure(Sealed):
         with np.errstate(over="ignore", invalid="ignore", divide="ignore"):
             return cls._from_problem(problem, products)._finite()
 
+    @classmethod
+    def as_computed(cls, problem: ProblemData) -> CondensedEnclosure:
+        """S and g as computed in floats, as balls of radius zero."""
+        c = problem.condensed
+        zero, none = np.zeros_like(c.S), np.zeros_like(c.g0)
+        return cls(c.S, zero, c.g0, none, c.g1, none, 0.0, problem)
+
     def restarted(self, problem: ProblemData, products: Products) -> CondensedEnclosure:
         """The enclosure of a problem of the same body with another load or slip offset: S is what it is here.
 

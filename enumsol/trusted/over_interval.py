@@ -25,7 +25,6 @@ from enumsol.trusted.status_rows import BACKWARD, FORWARD, ROW_KINDS, STILL, UND
 from enumsol.trusted.uniqueness_forms import Multipliers
 
 if TYPE_CHECKING:
-    from enumsol.model.problem import ContactProblem
     from enumsol.support.array_types import Floats, Indices, NDArray
 
 
@@ -118,13 +117,6 @@ class EnclosedPiece:
         """Signs that multipliers may have, (m, p, 9), for (partial) status codes (m, p)."""
         code = np.where((codes == UNDECIDED) & (self.high == 0), STILL, codes)
         return np.where((self.low == self.high)[:, None], _CONSTANT[code], _VARYING[code])
-
-
-def as_computed(problem: ContactProblem) -> CondensedEnclosure:
-    """S and g as computed in floats, as balls of radius zero."""
-    c = problem.condensed
-    zero, none = np.zeros_like(c.S), np.zeros_like(c.g0)
-    return CondensedEnclosure(c.S, zero, c.g0, none, c.g1, none, 0.0, problem)
 
 
 def interval_row_tables() -> NDArray[np.int8]:

@@ -180,10 +180,10 @@ class NoMotion:
                 beside[own] = 0.0
                 continue
             share = self.weights[own, own]
-            lean = float(np.linalg.norm(beside[node.leaves, own])) * (1 + 2.0**-40)
+            lean = float(np.linalg.norm(beside[node.leaves, own])) * SAFE
             if np.any(share != share[:1]) or np.any(share < 0):
                 return False
-            if own and not lean <= share[0] * max(0.0, float(node.F.low)) * (1 - 2.0**-40):
+            if own and not lean <= share[0] * max(0.0, float(node.F.low)) / SAFE:
                 return False
             beside[node.leaves, own] = beside[own, own] = 0.0
         pairs = np.outer(signed, signed)
@@ -367,8 +367,8 @@ class Growing:
         if determinant_sign(_across(left, first, right)) * determinant_sign(_across(left, last, right)) >= 0:
             return None
         # K(low) <= K(mu) <= K(high)
-        spread = np.sqrt(np.maximum((last - first).high.diagonal(), 0.0)) * (1 + 2.0**-40) + TINY
-        K = Ball(first.mid, (first.rad + np.outer(spread, spread)) * (1 + 2.0**-40))
+        spread = np.sqrt(np.maximum((last - first).high.diagonal(), 0.0)) * SAFE + TINY
+        K = Ball(first.mid, (first.rad + np.outer(spread, spread)) * SAFE)
         vector = _null_vector(_across(left, K, right))
         if vector is None:
             return None
@@ -477,7 +477,7 @@ def _slope(motions: Motions, node: Touching, code: int) -> Ball:
 def _room(motions: Motions, node: Touching, forces: Ball) -> Ball:
     """A lower bound of F y_n - |y_t|, of a node in 3D that touches and sticks."""
     pressure, along = (motions.moves[:, list(own)].T @ forces for own in ([node.leaves], node.slides))
-    size = float(np.linalg.norm(np.abs(along.mid) + along.rad)) * (1 + 2.0**-40)
+    size = float(np.linalg.norm(np.abs(along.mid) + along.rad)) * SAFE
     friction = Ball(node.F.mid.reshape(1, 1), node.F.rad.reshape(1, 1))
     return (friction * pressure)[:, 0] - Ball.exact(np.array([size]))
 

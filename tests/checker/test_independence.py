@@ -57,7 +57,7 @@ SHARED = {
     "trusted.exclusion": {"Terms", "exclusion_margin"},
     "trusted.floating_bounds": {"is_unbalanced", "motion_against", "motion_beside", "without_bound"},
     "trusted.arcs.over_parts": None,
-    "trusted.over_interval": {"EnclosedPiece", "PieceNumbers", "as_computed"},
+    "trusted.over_interval": {"EnclosedPiece", "PieceNumbers"},
     "trusted.arcs.precise": None,
     "trusted.arcs.taylor": {"AlphaFunctions", "ShortExpansion", "ball_of", "precision"},
     "trusted.positions": {"certain_statuses", "tangential_positions"},

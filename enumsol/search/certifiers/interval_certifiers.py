@@ -15,7 +15,7 @@ from enumsol.search.certifiers.rational_certifier import accepted, energy_bound_
 from enumsol.search.subintervals import IntervalCertifier, Piece
 from enumsol.selections.rational_selections import ExactSelections
 from enumsol.trusted.exclusion import exclusion_margin
-from enumsol.trusted.over_interval import EnclosedPiece, as_computed
+from enumsol.trusted.over_interval import EnclosedPiece
 
 if TYPE_CHECKING:
     from fractions import Fraction
@@ -116,7 +116,7 @@ class VerifiedIntervalCertifier(IntervalCertifier):
 def certified_enclosure(problem: ContactProblem, *, exactly: bool) -> CondensedEnclosure | None:
     """Balls for the data that a graph certifies; None when the problem's own data cannot be enclosed."""
     if not exactly:
-        return as_computed(problem)
+        return CondensedEnclosure.as_computed(problem)
     try:
         return enclosure_of(problem)
     except NotEnclosedError:
