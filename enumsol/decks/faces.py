@@ -83,14 +83,13 @@ def corners_of(faces: Integers) -> Integers:
 
 def free_faces(deck: Deck) -> Integers:
     """Faces (k, 2) of bodies that belong to one element only, as in `Surface`."""
-    keys, faces, first = [np.zeros((0, 4), dtype=np.int64)], [_NO_FACES], 0
-    for block in deck.blocks:
+    keys, faces = [np.zeros((0, 4), dtype=np.int64)], [_NO_FACES]
+    for first, block in zip(deck.firsts, deck.blocks, strict=False):
         shape = block.type.shape
         for number, nodes in enumerate(shape.faces if deck.is_body(block) else ()):
             corners = [node for node in nodes if node < shape.corners]
             keys.append(corners_of(block.nodes[:, corners]))
             faces.append(np.column_stack([first + np.arange(len(block.labels)), np.full(len(block.labels), number)]))
-        first += len(block.labels)
     every, of = np.concatenate(keys), np.concatenate(faces)
     # a side of a collapsed element may be a line or a point
     whole = np.sum(every >= 0, axis=1) >= max(deck.dimension, 2)

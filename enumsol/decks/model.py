@@ -10,6 +10,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, field, replace
 from functools import cached_property
+from itertools import accumulate
 from pathlib import Path
 from typing import Literal
 
@@ -607,6 +608,11 @@ class Deck:
         """Dimension of the bodies, 2 or 3; 0 if there are none."""
         bodies = [block.type for block in self.blocks if len(block.labels) and block.type.is_body]
         return max((kind.shape.dimension for kind in bodies), default=0)
+
+    @property
+    def firsts(self) -> list[int]:
+        """Row of the first element of each block, and the row behind the last element."""
+        return [*accumulate((len(block.labels) for block in self.blocks), initial=0)]
 
     def is_body(self, block: ElementBlock) -> bool:
         """True for elements of bodies: plane ones beside solid ones only carry names, as in meshes of gmsh."""

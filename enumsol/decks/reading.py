@@ -323,7 +323,7 @@ def add_layers(deck: Deck) -> None:
     for coupling in deck.couplings:
         if coupling.card == "RIGID BODY" and coupling.target in deck.element_sets:
             rigid[deck.element_sets[coupling.target]] = True
-    firsts = np.cumsum([0, *(len(block.labels) for block in deck.blocks)])
+    firsts = deck.firsts
     chosen = [
         k for k, block in enumerate(deck.blocks)
         if block.type.family in _FAMILIES and len(block.labels) and np.all(rigid[firsts[k] : firsts[k + 1]])
@@ -331,7 +331,7 @@ def add_layers(deck: Deck) -> None:
     bodies = [block for block in deck.blocks if block.type.is_body]
     if not chosen or not bodies:
         return
-    faces = [(k, _outward(deck, k, int(firsts[k]))) for k in chosen]
+    faces = [(k, _outward(deck, k, firsts[k])) for k in chosen]
     behind = _behind(deck, [nodes for _, nodes in faces], bodies[0].type.family == "axisymmetric")
     rows = np.concatenate([np.arange(firsts[k], firsts[k + 1]) for k in chosen])
     for k, nodes in faces:

@@ -158,11 +158,9 @@ def elastic_sections(deck: Deck) -> list[tuple[Section, Integers]]:
 def _planes(deck: Deck, parts: DeckParts) -> Any:
     """Plane of all cells, or of each by sets of elements."""
     rows: dict[str, list[Integers]] = {}
-    first = 0
-    for block in deck.blocks:
-        own = np.arange(first, first := first + len(block.labels))
+    for first, block in zip(deck.firsts, deck.blocks, strict=False):
         if deck.is_body(block):
-            rows.setdefault(_PLANES[block.type.family], []).append(own)
+            rows.setdefault(_PLANES[block.type.family], []).append(first + np.arange(len(block.labels)))
     if len(rows) == 1:
         return next(iter(rows))
     return {parts.elements(np.concatenate(own), f"plane {name}"): name for name, own in rows.items()}

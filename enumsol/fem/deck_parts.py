@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field, replace
+from dataclasses import replace
 from functools import cached_property
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
@@ -12,11 +12,13 @@ import numpy as np
 from enumsol.decks.faces import face_nodes, faces_of_nodes
 from enumsol.decks.model import Account, Surface
 from enumsol.errors import InvalidArgumentError
-from enumsol.fem.meshes import completing
+from enumsol.fem.meshes import ALL, FileMesh, completing
+from enumsol.model.cells import padded
 from enumsol.support.messages import counted
 
 if TYPE_CHECKING:
     from enumsol.decks.cards import DeckPlace
+    from enumsol.decks.elements import Shape
     from enumsol.decks.model import Deck, ElementBlock
     from enumsol.fem.meshes import PartedMesh
     from enumsol.support.array_types import Floats, Integers, Mask, NDArray
@@ -170,66 +172,13 @@ class DeckParts:
 _CARRYING = ("SOLID SECTION", "SHELL SECTION", "MEMBRANE SECTION", "BEAM SECTION")
 #: Elements without a section that are left out wherever they lie: lines of meshes, and what has cards of its own.
 _LEFT_OUT = ("trusses", "beams", "springs", "dashpots", "gap elements", "couplings", "point masses")
+#: Beginning of the names of sets of gmsh's own, which are no parts.
+OF_GMSH = "gmsh:"
 #: What meshio writes at the top of its decks, in which a type of elements stands for nothing but a shape.
 _WRITTEN_BY_SHAPE = "written by meshio"
 
 
-@dataclass(frozen=True, eq=False)
-class CellBlock:
-    """Cells of one kind: its name as meshio has it, nodes (m, k) in the order of VTK, and names in the deck."""
-
-    type: str
-    data: Integers
-    labels: NDArray[Any]
-
-
-@dataclass(eq=False)
-class DeckMesh:
-    """A deck as a mesh, with what a meshio.Mesh has, and the types and numbers of its elements.
-
-    Attributes
-    ----------
-    points : (N, 3) array
-    cells : list of CellBlock
-        Cells of bodies, and facets of surfaces and of elements that only carry the name of a set.
-    point_sets : dict of names to rows of points
-    cell_sets : dict of names to lists of rows of cells, by blocks
-    types : list of str
-        Of the elements of bodies.
-    node_labels : list of int or str
-        Numbers of the nodes in the deck, behind the names of instances.
-    """
-
-    points: Floats
-    cells: list[CellBlock] = field(default_factory=list)
-    point_sets: dict[str, Integers] = field(default_factory=dict)
-    cell_sets: dict[str, list[Integers]] = field(default_factory=dict)
-    types: list[str] = field(default_factory=list)
-    node_labels: list[int] | list[str] = field(default_factory=list)
-    point_data: dict[str, Any] = field(default_factory=dict)
-    cell_data: dict[str, Any] = field(default_factory=dict)
-    field_data: dict[str, Any] = field(default_factory=dict)
-
-    def add(self, kind: str, data: Integers, labels: NDArray[Any], names: dict[str, Integers]) -> None:
-        """Add a block of cells, and which of its rows belong to which sets."""
-        self.cells.append(CellBlock(kind, data, labels))
-        for name, rows in names.items():
-            own = self.cell_sets.setdefault(name, [])
-            own += [np.zeros(0, dtype=np.int64)] * (len(self.cells) - 1 - len(own))
-            own.append(rows)
-
-    def labels(self, kinds: list[str]) -> NDArray[Any]:
-        """Names of all cells of some kinds in the deck: numbers, behind those of instances if there are any."""
-        return np.concatenate([block.labels for block in self.cells if block.type in kinds])
-
-    def closed(self) -> DeckMesh:
-        """Finished mesh, with all sets as long as the list of blocks."""
-        for own in self.cell_sets.values():
-            own.extend([np.zeros(0, dtype=np.int64)] * (len(self.cells) - len(own)))
-        return self
-
-
-def deck_mesh(deck: Deck, *, spelled: bool = False) -> DeckMesh:
+def deck_mesh(deck: Deck, *, spelled: bool = False) -> FileMesh:
     """Cells and named parts of a deck.
 
     Bodies are its solid elements, or its plane ones if there are no solid ones. Elements of one dimension less that
@@ -247,40 +196,81 @@ def deck_mesh(deck: Deck, *, spelled: bool = False) -> DeckMesh:
         There are no bodies, or elements of another kind that carry something, or of which something is lost.
     """
     refuse_carriers(deck)
-    bodies, shapes = _bodies(deck)
-    types = () if shapes else dict.fromkeys(deck.blocks[k].type.name for k in bodies)
-    of = deck.spelled if spelled else {}
-    made = DeckMesh(deck.points, types=list(types), node_labels=deck.node_names())
-    firsts = np.cumsum([0, *(len(block.labels) for block in deck.blocks)])
+    bodies, by_shape = _bodies(deck)
+    blocks = [deck.blocks[k] for k in bodies]
+    firsts, of = deck.firsts, deck.spelled if spelled else {}
+    faces = [
+        (of.get(name, name), shape, nodes)
+        for name, own in _facets(deck, bodies).items()
+        for shape, nodes in face_nodes(deck, own)
+    ]
+    labels: list[NDArray[Any]] = [block.labels for block in blocks]
+    if len(deck.instances) > 1:
+        labels = [np.array([deck.element_name(row) for row in range(firsts[k], firsts[k + 1])]) for k in bodies]
+    shapes, node_sets = [block.type.shape for block in blocks], _node_sets(deck, of)
+    return FileMesh(
+        deck.points,
+        list(dict.fromkeys(shape.name for shape in (*shapes, *(shape for _, shape, _ in faces)))),
+        [block.nodes[:, block.type.shape.to_vtk or slice(None)] for block in blocks],
+        _named_facets([own for own in faces if own[1].dimension == shapes[0].dimension - 1], bool(node_sets)),
+        node_sets,
+        _named_bodies(deck, bodies, of),
+        np.concatenate(labels),
+        () if by_shape else tuple(dict.fromkeys(block.type.name for block in blocks)),
+        deck.node_names(),
+    )
+
+
+def _named_facets(faces: list[tuple[str, Shape, Integers]], named: bool) -> dict[str, Integers]:
+    """Facets by their names; without any names, and if nothing else is ``named``, all of them."""
+    width = max((nodes.shape[1] for _, _, nodes in faces), default=0)
+    found: dict[str, list[Integers]] = {}
+    for name, _, nodes in faces:
+        if name and not name.startswith(OF_GMSH):
+            found.setdefault(name, []).append(nodes)
+    if faces and not found and not named:
+        found[ALL] = [nodes for _, _, nodes in faces]
+    return {name: padded(parts, width) for name, parts in found.items()}
+
+
+def _named_bodies(deck: Deck, bodies: list[int], of: dict[str, str]) -> dict[str, Integers]:
+    """Rows of the cells of sets, counted through the blocks of bodies alone."""
+    found: dict[str, list[Integers]] = {}
+    firsts, before = deck.firsts, 0
     for k in bodies:
-        _add_body(made, deck, k, int(firsts[k]), of)
-    for name, faces in _facets(deck, bodies, firsts).items():
-        for shape, nodes in face_nodes(deck, faces):
-            sets = {of.get(name, name): np.arange(len(nodes))} if name else {}
-            made.add(shape.name, nodes, np.zeros(len(nodes), dtype=np.int64), sets)
-    made.point_sets = {of.get(name, name): rows for name, rows in deck.node_sets.items()}
+        for key, rows in deck.element_sets.items():
+            own, name = rows[(rows >= firsts[k]) & (rows < firsts[k + 1])], of.get(key, key)
+            if len(own) and not name.startswith(OF_GMSH):
+                found.setdefault(name, []).append(own - firsts[k] + before)
+        before += firsts[k + 1] - firsts[k]
+    return {name: np.concatenate(parts) for name, parts in found.items()}
+
+
+def _node_sets(deck: Deck, of: dict[str, str]) -> dict[str, Integers]:
+    """Sets of nodes, and surfaces of nodes."""
+    found = {of.get(name, name): rows for name, rows in deck.node_sets.items()}
     for name, surface in deck.surfaces.items():
         if surface.nodes is not None:
-            other = made.point_sets.setdefault(of.get(name, name), surface.nodes)
+            other = found.setdefault(of.get(name, name), surface.nodes)
             if not np.array_equal(other, surface.nodes):
                 raise surface.place.refused(
                     f"the surface {name} has other nodes than the set {name}; expected other names"
                 )
-    return made.closed()
+    return found
 
 
-def _facets(deck: Deck, bodies: list[int], firsts: Integers) -> dict[str, Integers]:
+def _facets(deck: Deck, bodies: list[int]) -> dict[str, Integers]:
     """Faces (k, 2) of surfaces, and elements that only carry names, as in `Surface`, by the keys of their names.
 
     If no set names any of the elements that carry none, all of them are there without a name.
     """
     dimension = deck.blocks[bodies[0]].type.shape.dimension
     covered = _covered(deck, bodies)
-    carriers = np.zeros(firsts[-1], dtype=bool)
-    for k, block in enumerate(deck.blocks):
+    carriers = np.zeros(deck.firsts[-1], dtype=bool)
+    for k, (first, block) in enumerate(zip(deck.firsts, deck.blocks, strict=False)):
         if k not in bodies:
             own = np.all(covered[block.nodes], axis=1) & (block.type.shape.dimension == dimension - 1)
-            carriers[firsts[k] : firsts[k + 1]] = own
+            carriers[first : first + len(own)] = own
     found = {name: _themselves(rows[carriers[rows]]) for name, rows in deck.element_sets.items()}
     found = {name: faces for name, faces in found.items() if len(faces)}
     if np.any(carriers) and not found:
@@ -305,11 +295,10 @@ def refuse_carriers(deck: Deck) -> None:
         It names a type and a line.
     """
     bodies, _ = _bodies(deck)
-    first, covered = 0, _covered(deck, bodies)
-    for k, block in enumerate(deck.blocks):
+    covered = _covered(deck, bodies)
+    for k, (first, block) in enumerate(zip(deck.firsts, deck.blocks, strict=False)):
         if k not in bodies:
             _check_carrier(deck, block, first, deck.blocks[bodies[0]].type.shape.dimension, covered)
-        first += len(block.labels)
 
 
 def _themselves(rows: Integers) -> Integers:
@@ -333,20 +322,6 @@ def _bodies(deck: Deck) -> tuple[list[int], bool]:
             f"{found}; expected solid ones (C3D8, C3D4 and the like), or plane ones (CPS4, CPE8, CAX6 and the like)"
         )
     return bodies, shapes
-
-
-def _add_body(made: DeckMesh, deck: Deck, k: int, first: int, of: dict[str, str]) -> None:
-    """Add the elements of a block."""
-    block, sets = deck.blocks[k], {}
-    for name, rows in deck.element_sets.items():
-        own = rows[(rows >= first) & (rows < first + len(block.labels))] - first
-        if len(own):
-            sets[of.get(name, name)] = own
-    shape = block.type.shape
-    labels = block.labels
-    if len(deck.instances) > 1:
-        labels = np.array([deck.element_name(first + row) for row in range(len(labels))])
-    made.add(shape.name, block.nodes[:, shape.to_vtk] if shape.to_vtk else block.nodes, labels, sets)
 
 
 def _check_carrier(deck: Deck, block: ElementBlock, first: int, dimension: int, covered: Mask) -> None:

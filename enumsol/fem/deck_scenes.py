@@ -410,13 +410,11 @@ def run_calculix(text: str, name: str, plane: bool) -> AssembledStiffness:
 def _deck_of_elements(deck: Deck, points: Floats) -> str:
     """A deck of the elements of bodies alone, whose nodes and elements have the numbers of their rows from 1."""
     lines = ["*NODE", *(f"{row},{x!r},{y!r},{z!r}" for row, (x, y, z) in enumerate(points.tolist(), 1))]
-    first = 1
-    for block in deck.blocks:
+    for first, block in zip(deck.firsts, deck.blocks, strict=False):
         if deck.is_body(block):
             lines.append(f"*ELEMENT, TYPE={block.type.name}")
-            for number, nodes in enumerate((block.nodes + 1).tolist(), first):
+            for number, nodes in enumerate((block.nodes + 1).tolist(), first + 1):
                 lines += continued([str(number), *map(str, nodes)], 8)
-        first += len(block.labels)
     for k, (section, rows) in enumerate(elastic_sections(deck)):
         material = deck.materials[section.material]
         law = {"ISO": "", "ORTHO": ", TYPE=ORTHO"}.get(material.elastic, ", TYPE=ENGINEERING CONSTANTS")

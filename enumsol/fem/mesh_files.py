@@ -18,8 +18,8 @@ from typing import TYPE_CHECKING, Any, cast
 import numpy as np
 
 from enumsol.errors import InvalidArgumentError, MissingDependencyError
-from enumsol.fem.deck_parts import DeckMesh, deck_mesh
-from enumsol.fem.meshes import ALL, SAME, PartedMesh, SolidMesh, as_cells_have, joined, positions
+from enumsol.fem.deck_parts import OF_GMSH, deck_mesh
+from enumsol.fem.meshes import ALL, SAME, FileMesh, PartedMesh, SolidMesh, as_cells_have, joined, positions
 from enumsol.model.cells import KINDS, boundary_facets, by_kind, numbers_of_nodes, padded
 from enumsol.support.arguments import file_path, shown
 from enumsol.support.array_arguments import real_array, short_vector
@@ -159,7 +159,9 @@ def _of_deck(place: Path, groups: str | None, dimension: int | None, ignore: Col
     from enumsol.decks.reading import described  # not for other files
 
     with about(place, InvalidArgumentError):
-        return _parted(deck_mesh(described(place, ignore=ignore, bare=True), spelled=True), groups, dimension)
+        if groups is not None:
+            raise _no_groups(groups, ())
+        return _parted(deck_mesh(described(place, ignore=ignore, bare=True), spelled=True), dimension)
 
 
 def mesh_of_deck(deck: Deck) -> PartedMesh:
@@ -170,14 +172,14 @@ def mesh_of_deck(deck: Deck) -> PartedMesh:
     InvalidArgumentError
         As `read_mesh`.
     """
-    return _parted(deck_mesh(deck), None, None)
+    return _parted(deck_mesh(deck), None)
 
 
 def _checked(mesh: object, groups: str | None, dimension: int | None, place: Path | None, said: str) -> PartedMesh:
     try:
         if place is not None:
             refuse_partial(place, mesh, said)
-        return _parted(mesh, groups, dimension)
+        return _parted(_of_meshio(mesh, groups, dimension), dimension)
     except InvalidArgumentError:
         raise
     except (IndexError, KeyError, OverflowError, TypeError, ValueError) as error:  # what meshio does not check
@@ -185,41 +187,52 @@ def _checked(mesh: object, groups: str | None, dimension: int | None, place: Pat
         raise InvalidArgumentError(f"the arrays of the mesh do not fit together ({reason})") from error
 
 
-def _parted(mesh: meshio.Mesh | DeckMesh, groups: str | None, dimension: int | None) -> PartedMesh:
+def _of_meshio(mesh: meshio.Mesh, groups: str | None, dimension: int | None) -> FileMesh:
+    """Contents of a meshio.Mesh, of a body of this dimension; None: by its cells."""
     kinds = list(dict.fromkeys(block.type for block in mesh.cells))
-    if dimension is None:
-        spatial = any(kind.startswith(("tetra", "hexa", "wedge", "pyramid", "polyhedron")) for kind in kinds)
-        dimension = 3 if spatial else 2
+    dimension = dimension or _dimension(kinds)
     bodies, sides = body_kinds(kinds, dimension)
-    types, labels = (tuple(mesh.types), mesh.labels(bodies)) if isinstance(mesh, DeckMesh) else ((), None)
     blocks = [np.asarray(block.data).astype(np.int64) for block in mesh.cells if block.type in bodies]
+    facets, named = _named(mesh, sides, groups, dimension), _grouped(mesh, bodies, groups, dimension)
+    return FileMesh(np.asarray(mesh.points), kinds, blocks, facets, _node_sets(mesh), named)
+
+
+def _dimension(kinds: list[str]) -> int:
+    spatial = any(kind.startswith(("tetra", "hexa", "wedge", "pyramid", "polyhedron")) for kind in kinds)
+    return 3 if spatial else 2
+
+
+def _parted(file: FileMesh, dimension: int | None) -> PartedMesh:
+    dimension = dimension or _dimension(file.kinds)
+    (_, sides), blocks, labels = body_kinds(file.kinds, dimension), file.blocks, file.labels
     used = np.unique(np.concatenate([block.ravel() for block in blocks]))
-    if len(used) and not 0 <= used[0] <= used[-1] < len(mesh.points):
+    if len(used) and not 0 <= used[0] <= used[-1] < len(file.points):
         raise InvalidArgumentError(
-            f"the cells name nodes from {used[0]} to {used[-1]}; expected them in 0 .. {len(mesh.points) - 1}"
+            f"the cells name nodes from {used[0]} to {used[-1]}; expected them in 0 .. {len(file.points) - 1}"
         )
-    points = np.asarray(mesh.points)[used]
+    points = file.points[used]
     nodes = positions(points, 3) if dimension == 3 else _plane(points)
     nodes, cells = joined(nodes, [np.searchsorted(used, block) for block in blocks], labels)
     # a collapsed cell may name nodes between corners that it has no more
     used, kept = np.concatenate([used, np.full(len(nodes) - len(used), -1)]), np.unique(cells)
     nodes, inside, of_file = nodes[kept], np.searchsorted(kept, cells), used[kept]
-    number = np.full(len(mesh.points), -1)
+    number = np.full(len(file.points), -1)
     number[of_file[of_file >= 0]] = np.flatnonzero(of_file >= 0)
     if dimension == 3:
         from enumsol.fem.solid_problems import solid_mesh  # not for plane meshes
 
         nodes, inside = solid_mesh(nodes, inside, numbers_of_nodes(3), labels)
-    sets = {name: kept for name, rows in _node_sets(mesh).items() if len(kept := _inside(number, rows, name))}
-    facets = {name: _inside(number, rows, name) for name, rows in _named(mesh, sides, groups, dimension).items()}
+    sets = {name: kept for name, rows in file.node_sets.items() if len(kept := _inside(number, rows, name))}
+    facets = {name: _inside(number, rows, name) for name, rows in file.facets.items()}
     lost = [name for name, rows in facets.items() if np.any(rows < 0)]
     if lost:
         raise InvalidArgumentError(f"facets of {lost[0]} have nodes of no cell; expected facets on the boundary")
     if "quad8" in sides and dimension == 3:
         facets = {name: as_cells_have(rows, inside, name) for name, rows in facets.items()}
     found, sets = facets_of_sets(dimension, inside, sets, int(np.sum(of_file >= 0)))
-    facets = {**found, **facets} if isinstance(mesh, DeckMesh) else facets or found
-    if not facets and isinstance(mesh, DeckMesh):
+    of_deck = file.node_labels is not None
+    facets = {**found, **facets} if of_deck else facets or found
+    if not facets and of_deck:
         raise InvalidArgumentError(
             "the deck names no part of its boundary; expected *SURFACE, or *NSET with all nodes of a facet"
         )
@@ -230,15 +243,14 @@ def _parted(mesh: meshio.Mesh | DeckMesh, groups: str | None, dimension: int | N
         )
     sets = {name: rows[rows >= 0] for name, rows in sets.items() if np.any(rows >= 0)}
     made = PartedMesh if dimension == 2 else SolidMesh
-    named = _grouped(mesh, bodies, groups, dimension)
-    parts, others, bodies_of = (MappingProxyType(each) for each in (facets, sets, named))
-    named_nodes = _node_labels(mesh, of_file, inside) if isinstance(mesh, DeckMesh) else None
-    return made(nodes, inside, parts, others, bodies_of, labels, types, named_nodes)
+    parts, others, bodies = (MappingProxyType(each) for each in (facets, sets, dict(file.bodies)))
+    names = None if file.node_labels is None else _node_labels(file.node_labels, of_file, inside)
+    return made(nodes, inside, parts, others, bodies, labels, file.types, names)
 
 
-def _node_labels(mesh: DeckMesh, of_file: Integers, cells: Integers) -> tuple[int | str, ...]:
+def _node_labels(labels: Sequence[int | str], of_file: Integers, cells: Integers) -> tuple[int | str, ...]:
     """Names of nodes in a deck; those of completed cells, rows -1 of the file, by the nodes at the corners around."""
-    names: list[int | str] = [mesh.node_labels[row] if row >= 0 else "" for row in of_file.tolist()]
+    names: list[int | str] = [labels[row] if row >= 0 else "" for row in of_file.tolist()]
     for _, nodes in by_kind(3, cells) if np.any(of_file < 0) else ():
         kind = KINDS[3, nodes.shape[1]]
         around_nodes = [(int(side[8]), side[:4]) for side in kind.sides if len(side) == 9]
@@ -287,11 +299,15 @@ def _node_sets(mesh: meshio.Mesh) -> dict[str, Integers]:
 def _named(mesh: meshio.Mesh, sides: list[str], groups: str | None, dimension: int) -> dict[str, Integers]:
     """Facets by the name of their group, in the numbers of the file."""
     if groups is not None and groups not in mesh.cell_data:
-        known = ", ".join(mesh.cell_data) or "none"
-        raise InvalidArgumentError(f"groups is {shown(groups)}; expected the name of cell data (found {known})")
+        raise _no_groups(groups, mesh.cell_data)
     every = _rows(mesh, sides)
     named = {name: every[rows] for name, rows in _grouped(mesh, sides, groups, dimension - 1).items()}
     return named if named or not len(every) or _node_sets(mesh) else {ALL: every}
+
+
+def _no_groups(groups: str, known: Collection[str]) -> InvalidArgumentError:
+    found = ", ".join(known) or "none"
+    return InvalidArgumentError(f"groups is {shown(groups)}; expected the name of cell data (found {found})")
 
 
 def _grouped(mesh: meshio.Mesh, kinds: Sequence[str], groups: str | None, dimension: int) -> dict[str, Integers]:
@@ -305,7 +321,7 @@ def _grouped(mesh: meshio.Mesh, kinds: Sequence[str], groups: str | None, dimens
     if groups is None:
         for name, sets in mesh.cell_sets.items():
             for k in rows:
-                if not name.startswith("gmsh:") and sets[k] is not None and len(sets[k]):
+                if not name.startswith(OF_GMSH) and sets[k] is not None and len(sets[k]):
                     named.setdefault(name, []).append(rows[k][np.asarray(sets[k], dtype=np.int64)])
     data, names, numbered = _tags(mesh, list(rows), groups, dimension)
     if not named and data is not None:

@@ -19,7 +19,7 @@ from enumsol.errors import InvalidArgumentError
 from enumsol.model.cells import KINDS, boundary_facets, by_kind, facet_rows, node_counts, padded
 from enumsol.support.arguments import finite_number, one_of, positive_integer, positive_number, shown
 from enumsol.support.array_arguments import array_of, plain_array, real_array, short_vector
-from enumsol.support.array_types import ArrayLike, Floats, Integers, Mask
+from enumsol.support.array_types import ArrayLike, Floats, Integers, Mask, NDArray
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -155,6 +155,34 @@ class SolidMesh(PartedMesh):
     node_sets, bodies, labels, types, node_labels
         As in `PartedMesh`.
     """
+
+
+@dataclass(frozen=True, eq=False)
+class FileMesh:
+    """A mesh as a file has it, in its own numbers of nodes, of which a `PartedMesh` is made.
+
+    Attributes
+    ----------
+    points : (N, d) array
+    kinds : list of str
+        Kinds of all cells, by meshio's names.
+    blocks : list of (m, k) int arrays
+        Cells of bodies by their kinds, in the order of VTK.
+    facets, node_sets, bodies, labels, types
+        As in `PartedMesh`.
+    node_labels : list of int or str, or None
+        Numbers of the nodes in a deck, behind the names of instances; None for other files.
+    """
+
+    points: Floats
+    kinds: list[str]
+    blocks: list[Integers]
+    facets: Mapping[str, Integers]
+    node_sets: Mapping[str, Integers]
+    bodies: Mapping[str, Integers]
+    labels: NDArray[Any] | None = None
+    types: tuple[str, ...] = ()
+    node_labels: list[int] | list[str] | None = None
 
 
 #: Largest number of cells along one side of a mesh.
