@@ -12,13 +12,16 @@ from __future__ import annotations
 
 import time
 from collections import defaultdict
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, NamedTuple
 
+import numpy as np
+
+from enumsol.condensation.enclosure import EnclosedSystem
 from enumsol.model.statuses import CONTACT, OPEN, UNDECIDED
-from enumsol.relaxation.active_set import ActiveSetEngine, IntervalSystem, PieceForm, interval_rows
-from enumsol.search.nodes import PairedTerms, Relaxations, better_form
-from enumsol.search.splitting import PlaneSplitting, branching_node
+from enumsol.relaxation.active_set import ActiveSetEngine, IntervalSystem, PieceForm
+from enumsol.search.nodes import Relaxations, ascended
+from enumsol.search.splitting import ImposedRows, PlaneSplitting, branching_node
 from enumsol.support.deadlines import Deadline, TimeOverError, within
 
 if TYPE_CHECKING:
@@ -55,6 +58,33 @@ class EmptyLeaf(NamedTuple):
     rows: Indices
     values: Floats
     form: Floats | None = None
+
+
+@dataclass(frozen=True, eq=False)
+class PairedTerms:
+    """The form (D lambda)'(S lambda - g) with D of (5.12), that does not depend on the piece.
+
+    D maps (lambda_n, lambda_t) of a node to (mu lambda_n + nu lambda_t, delta lambda_n + s lambda_t). The form is at
+    most zero at every solution for any friction F with |delta| <= F s.
+
+    Attributes
+    ----------
+    terms : (4, p) array
+        mu, nu, delta and s of every node.
+    """
+
+    terms: Floats
+
+    @classmethod
+    def of(cls, multipliers: Floats, F: Floats) -> PairedTerms:
+        """The form of multipliers mu, nu, alpha and beta (theory, section 5.8) with coefficients F."""
+        mu, nu, alpha, beta = multipliers
+        return cls(np.stack([mu, nu, F * (beta - alpha), alpha + beta]))
+
+    def multipliers(self, F: Floats) -> Floats:
+        """mu, nu, alpha and beta with other coefficients, which are at least as large."""
+        mu, nu, delta, s = self.terms
+        return np.stack([mu, nu, np.maximum(0.5 * (s - delta / F), 0.0), np.maximum(0.5 * (s + delta / F), 0.0)])
 
 
 @dataclass(frozen=True, slots=True)
@@ -102,26 +132,10 @@ class TreeResult:
     checkable: bool = True
 
 
-class IntervalSplitting(PlaneSplitting):
-    """Two dimensions over an interval of alpha.
-
-    Parameters
-    ----------
-    system : IntervalSystem
-    """
-
-    def __init__(self, system: IntervalSystem) -> None:
-        super().__init__(system.F)
-        self._constant = [bool(v) for v in system.F_lo == system.F]
-
-    def rows(self, node: int, code: int) -> Sequence[tuple[int, int]]:
-        """(kind, mode) of the rows that a contact node imposes in a status over the interval."""
-        return interval_rows(code, friction=self.friction[node], constant=self._constant[node])
-
-
 def _program(system: IntervalSystem, form: PieceForm | None = None) -> Relaxations:
     """Relaxations over one piece, or at one alpha."""
-    return Relaxations(ActiveSetEngine.over(system, form), IntervalSplitting(system), system.p)
+    splitting = PlaneSplitting(system.F, least=system.F_lo)
+    return Relaxations(ActiveSetEngine.over(system, form), splitting, system.p)
 
 
 @dataclass(slots=True)
@@ -313,6 +327,23 @@ class SubintervalTree:
         if item.above:
             item.roots = [root for root in waiting if isinstance(root, Subtree)]
         return not waiting
+
+
+def better_form(system: IntervalSystem) -> PairedTerms | None:
+    """A form that is clearly tighter than the energy over the piece; None: there is none.
+
+    It is sought for the load at the middle and the least friction of the piece, with which it is used. Where that is
+    zero at some node none is sought.
+    """
+    if not np.all(system.F_lo > 0):
+        return None
+    scaled = replace(system.scaled, g=system.g, F=system.F_lo)
+    enclosed = EnclosedSystem.as_computed(scaled.S, scaled.g, scaled.F, exactly=True)
+    codes = (UNDECIDED,) * scaled.p
+    rows = ImposedRows(PlaneSplitting(scaled.F), scaled.p).over(codes, range(scaled.p))
+    engine = ActiveSetEngine(replace(scaled, F=system.F))
+    found = ascended(scaled, enclosed, engine, codes, rows)
+    return None if found is None else PairedTerms.of(found.multipliers, system.F_lo)
 
 
 def _first(roots: Sequence[Subtree]) -> _Item:

@@ -13,22 +13,19 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
-import numpy as np
-
 from enumsol.condensation.enclosure import EnclosedSystem
 from enumsol.model.statuses import CONTACT, FRICTIONLESS, OPEN, UNDECIDED
 from enumsol.relaxation.active_set import ActiveSetEngine
 from enumsol.relaxation.engine import PRUNE_MARGIN
-from enumsol.search.splitting import ImposedRows, PlaneSplitting, Splitting
+from enumsol.search.splitting import ImposedRows, Splitting
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
 
     from enumsol.condensation.condensed import ScaledSystem
-    from enumsol.relaxation.active_set import IntervalSystem
     from enumsol.relaxation.engine import Engine, Relaxation
     from enumsol.search.certifiers.protocol import Led
-    from enumsol.support.array_types import Codes, Floats
+    from enumsol.support.array_types import Codes
     from enumsol.trusted.quadratic_forms import EnclosedForm, QuadraticForm
 
     Rows = tuple[list[int], list[int]]
@@ -378,47 +375,3 @@ def ascended(
             return None
         found = ascent.improve(found[0].multipliers, STEPS) or found
     return found[0]
-
-
-@dataclass(frozen=True, eq=False)
-class PairedTerms:
-    """The form (D lambda)'(S lambda - g) with D of (5.12), that does not depend on the piece.
-
-    D maps (lambda_n, lambda_t) of a node to (mu lambda_n + nu lambda_t, delta lambda_n + s lambda_t). The form is at
-    most zero at every solution for any friction F with |delta| <= F s.
-
-    Attributes
-    ----------
-    terms : (4, p) array
-        mu, nu, delta and s of every node.
-    """
-
-    terms: Floats
-
-    @classmethod
-    def of(cls, multipliers: Floats, F: Floats) -> PairedTerms:
-        """The form of multipliers mu, nu, alpha and beta (theory, section 5.8) with coefficients F."""
-        mu, nu, alpha, beta = multipliers
-        return cls(np.stack([mu, nu, F * (beta - alpha), alpha + beta]))
-
-    def multipliers(self, F: Floats) -> Floats:
-        """mu, nu, alpha and beta with other coefficients, which are at least as large."""
-        mu, nu, delta, s = self.terms
-        return np.stack([mu, nu, np.maximum(0.5 * (s - delta / F), 0.0), np.maximum(0.5 * (s + delta / F), 0.0)])
-
-
-def better_form(system: IntervalSystem) -> PairedTerms | None:
-    """A form that is clearly tighter than the energy over the piece; None: there is none.
-
-    It is sought for the load at the middle and the least friction of the piece, with which it is used. Where that is
-    zero at some node none is sought.
-    """
-    if not np.all(system.F_lo > 0):
-        return None
-    scaled = replace(system.scaled, g=system.g, F=system.F_lo)
-    enclosed = EnclosedSystem.as_computed(scaled.S, scaled.g, scaled.F, exactly=True)
-    codes = (UNDECIDED,) * scaled.p
-    rows = ImposedRows(PlaneSplitting(scaled.F), scaled.p).over(codes, range(scaled.p))
-    engine = ActiveSetEngine(replace(scaled, F=system.F))
-    found = ascended(scaled, enclosed, engine, codes, rows)
-    return None if found is None else PairedTerms.of(found.multipliers, system.F_lo)

@@ -24,6 +24,9 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Sequence
     from concurrent.futures import Executor
 
+    #: Examines so many nodes of a part, in a worker; it is sent there once and used for many tasks.
+    Worker = Callable[[Sequence[Any], int], "Answer"]
+
 #: Of the subtrees that a task gives back, so many become tasks of their own: those nearest to the root of the tree.
 ALONE = 4
 #: Tasks that follow on others examine twice as many nodes as these, up to so many times.
@@ -103,13 +106,6 @@ class SharedTree(Protocol):
 
     def leave(self, items: Sequence[Any]) -> None:
         """Leave subtrees unexamined."""
-
-
-class Worker(Protocol):
-    """Examines parts in a worker; it is sent there once and used for many tasks."""
-
-    def examined(self, roots: Sequence[Any], nodes: int) -> Answer:
-        """Examine so many nodes, until the time is over."""
 
 
 class Spread(ABC):
@@ -282,4 +278,4 @@ def _examined(key: bytes, data: bytes | None, roots: Sequence[Any], nodes: int, 
         _local.worker, _local.key = pickle.loads(data), key
     worker: Worker = _local.worker
     with within(Deadline.after(time.perf_counter(), seconds)):
-        return worker.examined(roots, nodes)
+        return worker(roots, nodes)

@@ -366,7 +366,7 @@ class _TreeWorker:
     def _solvers(self) -> SearchSetup:
         return self.remake()
 
-    def examined(self, roots: Sequence[TreeNode], nodes: int) -> Answer:
+    def __call__(self, roots: Sequence[TreeNode], nodes: int) -> Answer:
         """Examine so many nodes, until the time is over."""
         solvers, records = self._solvers.fresh(), KeptRecords()
         certifier = solvers.certifier(records)
@@ -514,11 +514,8 @@ class Replay:
             stack.append(item)
             return False
         self._learning = learning and search.lookahead.learn(item.codes, split.node)
-        search.certifier.branching(split.node, split.children)
+        stack += search.split(item, None, split.node, split.children)
         search.outcome.resumed += 1
-        weight = item.weight / len(split.children)
-        below = reversed(split.below(item.codes))
-        stack += [TreeNode(None, codes, split.node, last=False, weight=weight) for codes in below]
         return True
 
     def _proven(self, item: TreeNode, record: list[Any]) -> bool:

@@ -8,7 +8,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Protocol
 
 from enumsol.model.statuses import CONTACT, FRICTIONLESS, OPEN, SLIDING, SLIP_MINUS, SLIP_PLUS, STICK, UNDECIDED
-from enumsol.relaxation.engine import status_rows
+from enumsol.relaxation.active_set import interval_rows
 from enumsol.trusted.status_rows import is_covering, refines
 
 if TYPE_CHECKING:
@@ -109,7 +109,7 @@ _CONTACT = STICK, SLIP_PLUS, SLIP_MINUS
 
 
 class PlaneSplitting:
-    """Two dimensions at one alpha: open or in contact; then stick, slip+ or slip-.
+    """Two dimensions: open or in contact; then stick, slip+ or slip-.
 
     Parameters
     ----------
@@ -118,14 +118,21 @@ class PlaneSplitting:
     allowed : per node the final codes to be examined; default all
     sliding : FORWARD or BACKWARD for nodes that slide without load as far as is known; read as the search goes on
         They are split into that code and the two statuses that it does not contain.
+    least : (p,) array, optional
+        Over an interval of alpha the smallest coefficients, F being the largest; by default there is one alpha.
     """
 
     def __init__(
-        self, F: Floats, allowed: Sequence[frozenset[int]] | None = None, sliding: Mapping[int, int] | None = None
+        self,
+        F: Floats,
+        allowed: Sequence[frozenset[int]] | None = None,
+        sliding: Mapping[int, int] | None = None,
+        least: Floats | None = None,
     ) -> None:
         self._F: list[float] = F.tolist()
         self._sliding = sliding if sliding is not None else {}
         self.friction = [bool(f > 0) for f in F]
+        self._constant = [least is None or bool(least[i] == f) for i, f in enumerate(F)]
         every = frozenset((OPEN, STICK, SLIP_PLUS, SLIP_MINUS, FRICTIONLESS))
         self._allowed = list(allowed) if allowed is not None else [every] * len(F)
         #: Per node the codes of its friction in contact, and those of the two parts of an undecided one.
@@ -151,7 +158,7 @@ class PlaneSplitting:
 
     def rows(self, node: int, code: int) -> Sequence[tuple[int, int]]:
         """(kind, mode) of the rows that a contact node imposes in a status."""
-        return status_rows(code, friction=self.friction[node])
+        return interval_rows(code, friction=self.friction[node], constant=self._constant[node])
 
     def children(self, codes: Codes, node: int, relaxation: Relaxation | None) -> list[int]:
         """Codes of the children, the one nearest to the minimiser first."""

@@ -363,7 +363,7 @@ class TreeSearch:
             self._close(item, led)
             return []
         if led is not None:
-            return self._split(item, None, *led)
+            return self.split(item, None, *led)
         if self.closer.leads and item.parent is None and self.excluded(item, NO_BOUND):
             return []
         relaxation: Relaxation | None
@@ -386,9 +386,9 @@ class TreeSearch:
             return []
         children = self.splitting.children(codes, node, relaxation)
         outcome.presolved += forced is not None
-        return self._split(item, usable, node, children, forced)
+        return self.split(item, usable, node, children, forced)
 
-    def _split(
+    def split(
         self,
         item: TreeNode,
         usable: Relaxation | None,

@@ -16,7 +16,7 @@ from rational_checker import check_records
 from enumsol import branch_graph, gallery, verify
 from enumsol.relaxation.active_set import ActiveSetEngine, IntervalSystem, PieceForm
 from enumsol.search import interval_tree
-from enumsol.search.nodes import PairedTerms, better_form
+from enumsol.search.interval_tree import PairedTerms, better_form
 from enumsol.trusted.exclusion import exclusion_margin
 from enumsol.trusted.over_interval import EnclosedPiece
 

@@ -8,12 +8,13 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from dataclasses import dataclass, field, fields
 from functools import partial
-from typing import TYPE_CHECKING, Any, Protocol
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from enumsol.proof.leaves import UndecidedRecord, Unloaded
 from enumsol.proof.records import Branching, Record
+from enumsol.relaxation.engine import Relaxation
 from enumsol.selections.solution import VertexLimitError
 from enumsol.trusted.exclusion import exclusion_margin
 from enumsol.trusted.over_interval import EnclosedPiece
@@ -116,21 +117,6 @@ class Certified:
     bounded: bool = False
 
 
-class Bound(Protocol):
-    """Multipliers of a relaxation, or of a record of an earlier proof, for an assignment without a solution."""
-
-    @property
-    def bound(self) -> float:
-        """A lower bound that is positive."""
-
-    @property
-    def form(self) -> Any:
-        """The form that ``bound`` is about: an EnclosedForm, in 3D a SlipForm; None for the energy."""
-
-    def multipliers(self) -> tuple[Any, Floats]:
-        """Numbers of rows and their multipliers, which prove ``bound``."""
-
-
 @dataclass(frozen=True)
 class RecordedBound:
     """Multipliers that are said to bound the energy, or a form, from below; in place of a relaxation's.
@@ -148,6 +134,8 @@ class RecordedBound:
         return self.rows, self.values
 
 
+#: Multipliers of a relaxation, or of a record of an earlier proof, for an assignment without a solution.
+Bound = Relaxation | RecordedBound
 #: No multipliers: a certifier may know of other reasons why an assignment holds no solution.
 NO_BOUND = RecordedBound(np.zeros(0, dtype=np.intp), np.zeros(0))
 

@@ -181,6 +181,7 @@ class ExactCertifier(Certifier):
 
         if self._inverse is None:
             self._inverse = solver.system.S.inv()
-        terms = accepted(*relaxation.multipliers(), imposed, self._scaled)
+        rows, values = relaxation.multipliers()
+        terms = accepted(rows, values, imposed, self._scaled)
         forms = ((u, solver.form(RowKind(kind), node)) for kind, node, u in terms)
         return energy_bound_positive(solver.system.g, self._inverse, forms)

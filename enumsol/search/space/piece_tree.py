@@ -461,7 +461,7 @@ class PieceWorker:
     smallest: float
     curves: Curves
 
-    def examined(self, roots: Sequence[PieceNode], nodes: int) -> Answer:
+    def __call__(self, roots: Sequence[PieceNode], nodes: int) -> Answer:
         """Examine so many nodes, until the time is over or a curve is wanted."""
         # as they were sent, whatever was asked for in an earlier task
         curves = copy.copy(self.curves)
