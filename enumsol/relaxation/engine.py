@@ -80,6 +80,9 @@ class Engine(Protocol):
     def root(self, rows: list[int], modes: list[int]) -> Relaxation:
         """The relaxation with the given rows on."""
 
+    def bounding(self, form: Any) -> Engine | None:
+        """An engine whose relaxations bound a form, which is convex, in place of the energy; None: it has none."""
+
 
 INEQUALITY, EQUALITY = 1, 2
 _R = RowKind

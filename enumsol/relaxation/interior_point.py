@@ -48,6 +48,10 @@ class InteriorPointEngine:
         """The relaxation with the given rows on."""
         return self.solved(dict(zip(rows, modes, strict=True)))
 
+    def bounding(self, form: EnclosedForm) -> None:
+        """None: a fallback bounds the energy only."""
+        del form
+
     def solved(self, on: dict[int, int]) -> Relaxation:
         """The relaxation with these rows and their modes, solved from scratch."""
         import clarabel  # a fallback: most searches never need it

@@ -44,7 +44,8 @@ if TYPE_CHECKING:
 MAX_SELECTIONS = 4096
 #: In place of ``RANK_TOLERANCE`` at transition points of a path, whose alpha is located to about 1e-10.
 LOCATED_TOLERANCE = 1e-8
-_CODES = {**{status: code for code, status in enumerate(STATUSES)}, ContactStatus.SLIP: SLIP}
+#: Codes of statuses, in 3D that of slip in any direction.
+STATUS_CODES = {status: code for code, status in enumerate(STATUSES)} | {ContactStatus.SLIP: SLIP}
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -166,7 +167,7 @@ def branch_test(condensed: CondensedProblem, friction: tuple[Floats, Floats], ro
     frictionless = frictionless if frictionless.ndim == 1 else np.all(frictionless, axis=1)
     active = []
     for without, holds in zip(frictionless, root.active, strict=True):
-        codes = {_CODES[status] for status in holds}
+        codes = {STATUS_CODES[status] for status in holds}
         active.append(_without_friction(codes) if without else codes)
     F, slips = F0 + alpha * F1, None
     if F.ndim == 2:

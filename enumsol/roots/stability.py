@@ -12,10 +12,11 @@ import scipy.sparse as sp
 
 from enumsol.errors import InvalidArgumentError
 from enumsol.model.mesh import mass_fingerprint
-from enumsol.model.statuses import SLIP, STATUSES, ContactStatus
+from enumsol.model.statuses import ContactStatus
 from enumsol.proof.proof_file import PROOF_VERSION
 from enumsol.proof.stability_records import DOES_NOT, RUNS_AWAY, UNDECIDED, VERDICTS, certificate_record, root_record
 from enumsol.proof.writer import ProofWriter
+from enumsol.roots.local_branch import STATUS_CODES
 from enumsol.search.stability import Proven, StabilitySearch
 from enumsol.support.arguments import shown
 from enumsol.support.immutable import Sealed
@@ -34,7 +35,6 @@ if TYPE_CHECKING:
     from enumsol.support.array_types import ArrayLike, Floats
 
 Verdict = Literal["runs away", "does not run away", "undecided"]
-_CODES = {status: code for code, status in enumerate(STATUSES)} | {ContactStatus.SLIP: SLIP}
 
 
 @dataclass(frozen=True)
@@ -189,7 +189,7 @@ class Stabilities:
         every: bool = False,
     ) -> Iterator[Setting]:
         """Parts of the body for statuses that hold, coefficients by axis and, in 3D, directions of friction (p, 2)."""
-        codes = [frozenset(_CODES[status] for status in statuses) for statuses in active]
+        codes = [frozenset(STATUS_CODES[status] for status in statuses) for statuses in active]
         return self.body.settings(codes, F, directions, unsure, every=every)
 
     @staticmethod

@@ -296,16 +296,12 @@ class Forms:
     better : callable
         Gives a form that is clearly tighter than the energy over a partial assignment, or None; from an engine with the
         energy, the status codes, and numbers and modes of the rows of the assignment.
-    bounding : callable
-        Gives an engine with a form in place of the energy, or None; from an engine and a form that is proven convex.
     nodes : int
-        Nodes examined with the energy before a form is tried.
+        Nodes examined with the energy before a form is tried, by default FORM_AFTER.
     """
 
-    def __init__(
-        self, better: Callable[[Any, Codes, Rows], Any], bounding: Callable[[Any, Any], Engine | None], nodes: int
-    ) -> None:
-        self._better, self._bounding, self._nodes = better, bounding, nodes
+    def __init__(self, better: Callable[[Any, Codes, Rows], Any], nodes: int | None = None) -> None:
+        self._better, self._nodes = better, FORM_AFTER if nodes is None else nodes
         #: Relaxations with the form in use, and that form, an EnclosedForm or SlipForm; None for the energy.
         self.engine: Engine | None = None
         self.form: QuadraticForm | None = None
@@ -324,7 +320,7 @@ class Forms:
         if form is not None and form is self.form:
             return
         convex = form is not None and form.smallest_eigenvalue > 0
-        self.form, self.engine = form, self._bounding(engine, form) if convex else None
+        self.form, self.engine = form, engine.bounding(form) if convex else None
 
     def pay(self, engine: Engine, codes: Codes, rows: ImposedRows) -> bool:
         """True if a form at the root of the search is clearly tighter than the energy; it is then in use."""
@@ -335,20 +331,8 @@ class Forms:
         return True
 
 
-def plane_forms(scaled: ScaledSystem, enclosed: EnclosedSystem) -> Forms:
-    """Forms for a system in 2D and balls for it."""
-
-    def better(engine: Engine, codes: Codes, rows: Rows) -> EnclosedForm | None:
-        return ascended(scaled, enclosed, engine, codes, rows) if isinstance(engine, ActiveSetEngine) else None
-
-    def bounding(engine: Engine, form: EnclosedForm) -> Engine | None:
-        return engine.bounding(form) if isinstance(engine, ActiveSetEngine) else None
-
-    return Forms(better, bounding, FORM_AFTER)
-
-
 def ascended(
-    scaled: ScaledSystem, enclosed: EnclosedSystem, engine: ActiveSetEngine, codes: Codes, rows: Rows
+    scaled: ScaledSystem, enclosed: EnclosedSystem, engine: Engine, codes: Codes, rows: Rows
 ) -> EnclosedForm | None:
     """A form that is clearly tighter than the energy over a partial assignment; None: there is none.
 
@@ -357,11 +341,13 @@ def ascended(
     scaled : ScaledSystem
     enclosed : EnclosedSystem
         Balls for the same system.
-    engine : ActiveSetEngine
-        Relaxations with the energy.
+    engine : Engine
+        Relaxations with the energy; only those of an ActiveSetEngine can bound forms.
     codes : status codes
     rows : numbers and modes of the rows of the assignment
     """
+    if not isinstance(engine, ActiveSetEngine):
+        return None
     from enumsol.relaxation.convex_forms import PlaneFormAscent
 
     ascent = PlaneFormAscent(scaled, enclosed, engine, codes, rows)

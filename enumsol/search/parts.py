@@ -10,7 +10,6 @@ from __future__ import annotations
 import hashlib
 import heapq
 import pickle
-import threading
 import time
 from abc import ABC, abstractmethod
 from dataclasses import dataclass, field
@@ -18,7 +17,7 @@ from typing import TYPE_CHECKING, Any, Protocol
 
 from enumsol.search.outcome import StopReason
 from enumsol.support.deadlines import Deadline, within
-from enumsol.support.workers import Crew, Job
+from enumsol.support.workers import Crew, Job, kept_in_thread
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Sequence
@@ -267,15 +266,10 @@ class Spread(ABC):
         return True
 
 
-_local = threading.local()
-
-
 def _examined(key: bytes, data: bytes | None, roots: Sequence[Any], nodes: int, seconds: float | None) -> Answer | None:
     """Examine a part, in a worker; every thread makes what it needs once. None where it was not given that yet."""
-    if getattr(_local, "key", None) != key:
-        if data is None:
-            return None
-        _local.worker, _local.key = pickle.loads(data), key
-    worker: Worker = _local.worker
+    worker: Worker | None = kept_in_thread(key, data)
+    if worker is None:
+        return None
     with within(Deadline.after(time.perf_counter(), seconds)):
         return worker(roots, nodes)

@@ -24,7 +24,7 @@ from enumsol.search.certifiers.exclusions import Exclusions
 from enumsol.search.certifiers.protocol import Bound, Certifier, UndecidedPart, margin_of_form, solve_or_open
 from enumsol.search.certifiers.verified import VerifiedCertifier
 from enumsol.search.fathoming import Closer, holds_below, propose, without_load
-from enumsol.search.nodes import Forms, Relaxations, TreeCloser, plane_forms
+from enumsol.search.nodes import Forms, Relaxations, TreeCloser, ascended
 from enumsol.search.reduction import NEAR, WeightSource
 from enumsol.search.reference_closer import Cover, ReferenceCloser, proposed
 from enumsol.search.setup import WEAK, SearchSetup, weakly_held
@@ -304,7 +304,7 @@ class Solvers(SearchSetup):
         scaled = self.scaled
         fast = self.arithmetic == "fast"
         system = EnclosedSystem.as_computed(scaled.S, scaled.g, scaled.F) if fast else self.enclosed
-        return None if self.arithmetic == "exact" or system is None else plane_forms(scaled, system)
+        return None if self.arithmetic == "exact" or system is None else Forms(partial(ascended, scaled, system))
 
     def remake(self) -> Callable[[], Solvers]:
         """Makes the same again, also in another process."""

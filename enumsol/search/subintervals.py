@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import itertools
 import pickle
-import threading
 import time
 from dataclasses import dataclass, field
 from fractions import Fraction
@@ -23,7 +22,7 @@ from enumsol.relaxation.active_set import IntervalSystem
 from enumsol.search.interval_tree import LARGEST_TREE, EmptyLeaf, SubintervalTree, Subtree, TreeResult
 from enumsol.search.outcome import Stop, StopReason
 from enumsol.search.setup import WEAK
-from enumsol.support.workers import Crew, Job
+from enumsol.support.workers import Crew, Job, kept_in_thread
 from enumsol.trusted.over_interval import PieceNumbers
 
 if TYPE_CHECKING:
@@ -274,22 +273,15 @@ class IntervalSearch:
         everything = (Subtree((UNDECIDED,) * self._p),)
         return [Task(piece, everything) for piece in whole_pieces(*self.interval, self._origin)]
 
-    def trees(self) -> list[Task]:
-        """The trees with which the search begins, where a tree is needed."""
-        waiting, found = self.first()[::-1], []
-        while waiting:
-            task = waiting.pop()
-            if task.piece not in self.closed:
-                halves = self._in_halves(task)
-                waiting += halves[::-1]
-                found += [] if halves else [task]
-        return found
-
-    def _in_halves(self, task: Task) -> list[Task]:
+    def in_halves(self, task: Task) -> list[Task]:
         """Both halves at once, where a part of the piece needs no tree."""
         a, b = task.piece.a, task.piece.b
         inside = any(a <= piece.a and piece.b <= b for piece in self.closed if piece != task.piece)
         return Task.halves(task.piece, task.roots) if inside else []
+
+    def share(self, piece: Piece) -> Fraction:
+        """The part of the interval that a piece is."""
+        return (piece.b - piece.a) / (self.interval[1] - self.interval[0])
 
     def run(self, known: Mapping[Task, TreeResult] | None = None) -> None:
         """Search all pieces; ``known`` holds the results of tasks that were searched elsewhere.
@@ -303,7 +295,7 @@ class IntervalSearch:
             task = waiting.pop()
             found = SearchedPiece(task.piece, None, [root.codes for root in task.roots])
             self.pieces.append(found)
-            halves = self._in_halves(task)
+            halves = self.in_halves(task)
             if task.piece in self.closed:
                 found.closed = self.closed[task.piece]
                 found.selections[:] = found.closed.selections
@@ -403,9 +395,7 @@ class _Ahead:
     def run(self) -> None:
         """Search all trees, until a limit is reached."""
         search = self._search
-        a, b = search.interval
-        self._share = sum((piece.b - piece.a for piece in search.closed), Fraction(0)) / (b - a)
-        for task in search.trees():
+        for task in search.first():
             self._begin(task)
         while self._tasks:
             job = self._crew.next(self._seconds())
@@ -423,9 +413,15 @@ class _Ahead:
         return None if deadline is None else max(deadline - time.perf_counter(), 0.0)
 
     def _begin(self, task: Task) -> None:
-        """Hand out the first tree over a piece."""
-        self._first[task.piece], self._waiting[task.piece] = task, 1
-        self._hand_out(task)
+        """Hand out the first tree over a piece, or those of its halves where a part of it needs no tree."""
+        if task.piece in self._search.closed:
+            self._share += self._search.share(task.piece)
+        elif halves := self._search.in_halves(task):
+            for half in halves:
+                self._begin(half)
+        else:
+            self._first[task.piece], self._waiting[task.piece] = task, 1
+            self._hand_out(task)
 
     def _hand_out(self, task: Task) -> None:
         self._tasks[self._crew.submit(_search_tree, self._worker, task, self._seconds())] = task
@@ -444,8 +440,7 @@ class _Ahead:
         for half in halves:
             self._begin(half)
         if not halves and self._search.progress is not None:
-            a, b = self._search.interval
-            self._share += (piece.b - piece.a) / (b - a)
+            self._share += self._search.share(piece)
             self._search.progress(float(self._share))
 
     def _cut(self, piece: Piece) -> list[Subtree]:
@@ -463,14 +458,9 @@ class _Ahead:
         self._crew.cancel()
 
 
-_local = threading.local()
-
-
 def _search_tree(packed: bytes, task: Task, seconds: float | None) -> TreeResult:
     """Search one tree, in a worker; every thread has a searcher of its own, and keeps it for the next tree."""
-    if getattr(_local, "packed", None) != packed:
-        _local.worker, _local.packed = pickle.loads(packed), packed
-    worker: IntervalWorker = _local.worker
+    worker: IntervalWorker = kept_in_thread(packed, packed)
     return worker.run(task, deadline=None if seconds is None else time.perf_counter() + seconds)
 
 

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import multiprocessing
 import os
+import pickle
 import signal
 import threading
 import time
@@ -216,6 +217,18 @@ def spread(executor: Executor | None, calls: Iterator[Call[Key]]) -> Generator[t
                 yield running.pop(job), job.result
     finally:
         crew.cancel()
+
+
+_local = threading.local()
+
+
+def kept_in_thread(key: bytes, packed: bytes | None) -> Any:
+    """The object of a key, in a worker; every thread unpacks it once. None where it has another one and gets none."""
+    if getattr(_local, "key", None) != key:
+        if packed is None:
+            return None
+        _local.kept, _local.key = pickle.loads(packed), key
+    return _local.kept
 
 
 class _Lost(Exception):  # noqa: N818 (it never leaves this module)

@@ -501,7 +501,7 @@ class SpaceSolvers(SearchSetup):
     @property
     def _forms(self) -> Forms | None:
         """Forms with which a long search may bound in place of the energy."""
-        return Forms(self._better, SpaceEngine.bounding, NODES)
+        return Forms(self._better, NODES)
 
     def _better(self, engine: SpaceEngine, codes: Codes, rows: tuple[list[int], list[int]]) -> SlipForm | None:
         """A form that is clearly tighter than the energy over a partial assignment, or None."""
