@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import enum
 from dataclasses import dataclass, field, replace
-from typing import TYPE_CHECKING
+from fractions import Fraction
+from typing import TYPE_CHECKING, TypeVar
 
 from enumsol.support.deadlines import Deadline
 from enumsol.support.messages import counted
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
+    from collections.abc import Callable, Iterable
 
     from enumsol.search.certifiers.protocol import UndecidedPart
     from enumsol.selections.solution import SelectionSolution
@@ -172,3 +173,18 @@ class Stop:
             done = f"the arcs of {self.count} of {self.arcs_of} selections"
         text = self.reason.sentence.format(done=done, after=f" after {done}" if done else "")
         return text if self.unexamined is None else f"{text}, {counted(self.unexamined, 'subtree')} not examined"
+
+
+#: Bounds of alpha, or of mu.
+_Bound = TypeVar("_Bound", float, Fraction)
+
+
+def joined(ranges: Iterable[tuple[_Bound, _Bound]]) -> list[tuple[_Bound, _Bound]]:
+    """Ranges in their order, those that touch as one."""
+    found: list[tuple[_Bound, _Bound]] = []
+    for low, high in sorted(ranges):
+        if found and low <= found[-1][1]:
+            found[-1] = found[-1][0], max(high, found[-1][1])
+        else:
+            found.append((low, high))
+    return found

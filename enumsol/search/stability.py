@@ -22,6 +22,7 @@ from enumsol.search.growing_motions import (
     serves,
     smallest_eigenvalue,
 )
+from enumsol.search.outcome import joined
 from enumsol.support.conic import conic_answer
 from enumsol.support.deadlines import look
 from enumsol.trusted.running_away import Growing, Motions, NoMotion
@@ -87,13 +88,13 @@ class StabilitySearch:
         if not self.stiffness.increases:
             # neither a motion nor a range without end can be proven
             return Proven((), (), ((0.0, np.inf),))
-        gaps = _joined(list(self._plain()))
+        gaps = joined(list(self._plain()))
         ranges = () if self.motions.unsure else gaps
         growing = [found for ends in ranges for found in growing_between(self.stiffness, self.motions, *ends)]
         growing.sort(key=lambda item: -item[0].low)
         if not growing and self._limit is not None:
             gaps = [gap for ends in gaps for gap in self._divided(*ends, _NARROWEST, self._by_weights)]
-        return Proven(tuple(sorted(self._leaves, key=lambda leaf: leaf.low)), tuple(growing), tuple(_joined(gaps)))
+        return Proven(tuple(sorted(self._leaves, key=lambda leaf: leaf.low)), tuple(growing), tuple(joined(gaps)))
 
     # -- plain numbers
 
@@ -330,14 +331,3 @@ def _definite(
     answer = conic_answer((sp.csc_matrix((size + 1, size + 1)), goal), (A, b), cones, len(b) * (size + 1))
     x = np.asarray(answer.x)
     return x[:size] if len(x) and np.all(np.isfinite(x)) and x[size] > 1e-9 else None
-
-
-def _joined(gaps: list[tuple[float, float]]) -> list[tuple[float, float]]:
-    """Ranges next to each other as one."""
-    joined: list[tuple[float, float]] = []
-    for low, high in sorted(gaps):
-        if joined and joined[-1][1] >= low:
-            joined[-1] = joined[-1][0], high
-        else:
-            joined.append((low, high))
-    return joined

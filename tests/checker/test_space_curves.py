@@ -32,7 +32,7 @@ def part(low, high, alpha):
 def claimed(chains, low, high):
     """What the checker says of these curves over an interval, with a tree that leaves all of it open."""
     ends = Fraction(low), Fraction(high)
-    tree = [OpenLeaf(*ends, (6,) * problem().p, None)]
+    tree = [OpenLeaf(*ends)]
     return verify(problem(), ByCurves(problem(), ends, chains=list(chains), records=tree).proof())
 
 

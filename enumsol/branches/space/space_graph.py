@@ -25,8 +25,8 @@ from enumsol.proof.writer import ProofWriter, unit_exponents
 from enumsol.roots.enumerate import enumerate_roots
 from enumsol.roots.root_set import RigidBound, RootSet, SearchStats, Undecided
 from enumsol.roots.space_roots import SpaceEnumeration
-from enumsol.search.outcome import Stop, StopReason
-from enumsol.search.space.known_curves import Curves, joined
+from enumsol.search.outcome import Stop, StopReason, joined
+from enumsol.search.space.known_curves import Curves
 from enumsol.search.space.piece_tree import OpenLeaf, PieceTree, SpreadPieces
 from enumsol.search.space.space_search import SpaceSolvers
 from enumsol.support.deadlines import TimeOverError, look, remaining, within
@@ -273,7 +273,7 @@ class ByCurves:
     def _sentences(self) -> list[str]:
         """Sentences on where solutions may be missing, why, and what may decide it."""
         found, gaps, named = [], self.gaps, 5
-        met = [leaf for leaf in self.records if isinstance(leaf, OpenLeaf) and leaf.forces is not None]
+        met = [leaf for leaf in self.records if isinstance(leaf, OpenLeaf) and leaf.met]
         for low, high in gaps[:named]:
             ends = sum(low <= begin and end <= high for begin, end in self.ends)
             why, remedy = "pieces of alpha as short as are tried left statuses undecided", SHORT_INTERVAL

@@ -18,12 +18,13 @@ from enumsol.model.sectors import DEEPEST, SECTORS, holding, level_of, parts_aro
 from enumsol.proof.curve_records import OnCurve, ThroughCurveBox
 from enumsol.proof.leaves import NoRoot
 from enumsol.search.certifiers.protocol import ERRORS
+from enumsol.search.outcome import joined
 from enumsol.search.space.curve_proposals import curve_point, placed, unplaced
 from enumsol.search.space.space_fathoming import without_sectors
 from enumsol.trusted.space.pieces import lie_along
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Sequence
+    from collections.abc import Sequence
 
     from numpy.typing import NDArray
 
@@ -33,7 +34,7 @@ if TYPE_CHECKING:
     from enumsol.trusted.space.curve_runs import CurveChain, CurveParts
     from enumsol.trusted.space.leaves import Open, SpaceRoot
     from enumsol.trusted.space.pieces import AlphaPiece, LeafArc
-    from enumsol.trusted.space.solution_curve import AlphaProblem, SolutionCurve
+    from enumsol.trusted.space.solution_curve import AlphaProblem
 
     Bounds = tuple[Fraction, Fraction]
 
@@ -42,17 +43,6 @@ _SOUGHT = 8
 #: Around the directions of known curves sectors get more room by this share of what these turn by, and are no narrower
 #: than those of a level; a sector is cut so if no more than this share of it is left.
 _ROOM, _NARROWEST, _LEFT = 0.5, 9, 0.5
-
-
-def joined(ranges: Iterable[Bounds]) -> list[Bounds]:
-    """Ranges in their order, those that touch as one."""
-    found: list[Bounds] = []
-    for low, high in sorted(ranges):
-        if found and low <= found[-1][1]:
-            found[-1] = found[-1][0], max(high, found[-1][1])
-        else:
-            found.append((low, high))
-    return found
 
 
 class CurveWantedError(Exception):
@@ -97,22 +87,21 @@ class Curves:
         self.tried: set[tuple[Fraction, Fraction, Codes]] = set()
         self.known: list[CurveChain] = []
         self.ends: list[Bounds] = []
-        #: The curve of every box, numbered as in a proof.
-        self._boxes: list[SolutionCurve] = []
-        self._owner: list[int] = []
+        #: The curve of every box, numbered as in a proof, and which one of its links it is.
+        self._boxes: list[tuple[CurveChain, int]] = []
 
     # -- further curves --------------------------------------------------------------------------------------------
 
     def take(self, chain: CurveChain) -> None:
         """Add a curve to those that are known."""
-        self._boxes += [link.curve for link in chain.links]
-        self._owner += [len(self.known)] * len(chain.links)
+        self._boxes += [(chain, k) for k in range(len(chain.links))]
         self.known.append(chain)
-        boxes = [curve.box for curve in self._boxes]
+        curves = [link.curve for known in self.known for link in known.links]
+        boxes = [curve.box for curve in curves]
         self._c, self._d, self._e = (
             np.array([getattr(box, name) for box in boxes]) for name in ("centre", "direction", "border")
         )
-        self._b = np.array([curve.reach for curve in self._boxes])
+        self._b = np.array([curve.reach for curve in curves])
         self._h = np.array([box.half for box in boxes])
         # so near to the ends of curves nothing is searched
         room = Fraction(2.0**-14) * (self.interval[1] - self.interval[0])
@@ -169,8 +158,9 @@ class Curves:
             runs = {(min(pair), max(pair)) for pair in product(sides[0], sides[-1])}
             # a few rows of boxes of one curve, the shortest first, and no longer ones
             for first, last in sorted(runs, key=lambda run: run[1] - run[0])[:4]:
-                near = last - first < 64 and self._owner[first] == self._owner[last]
-                if near and lie_along(ends, self._boxes[first : last + 1], ERRORS):
+                (one, begin), (other, end) = self._boxes[first], self._boxes[last]
+                near = one is other and last - first < 64
+                if near and lie_along(ends, [link.curve for link in one.links[begin : end + 1]], ERRORS):
                     return first, last
         return None
 
@@ -188,7 +178,7 @@ class Curves:
 
     def runs_through(self, number: int, piece: AlphaPiece) -> bool:
         """True if the curve of a box has no end over a piece."""
-        return self.known[self._owner[number]].runs_through(piece.low, piece.high)
+        return self._boxes[number][0].runs_through(piece.low, piece.high)
 
 
 def middle_of(piece: AlphaPiece, root: SpaceRoot) -> Floats:

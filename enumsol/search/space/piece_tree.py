@@ -65,15 +65,13 @@ class OpenLeaf:
     ----------
     low, high : Fraction
         The piece of alpha.
-    codes : the partial assignment
-    forces : (3p,) array or None
-        Of a solution at the middle of the piece that lies in no box.
+    met : bool
+        A solution at the middle of the piece lies in no box.
     """
 
     low: Fraction
     high: Fraction
-    codes: Codes
-    forces: Floats | None
+    met: bool = False
 
 
 @dataclass(frozen=True, slots=True)
@@ -226,7 +224,7 @@ class PieceTree:
 
     def leave(self, items: Sequence[PieceNode]) -> None:
         """Leave subtrees open."""
-        self.records += [OpenLeaf(item.low, item.high, item.codes, None) for item in reversed(items)]
+        self.records += [OpenLeaf(item.low, item.high) for item in reversed(items)]
 
     def report(self, share: float) -> None:
         """Note that this share of the tree is done."""
@@ -350,7 +348,7 @@ class PieceTree:
 
     def _halved(self, at: ExaminedPiece, codes: Codes, cuts: int = 0) -> Done:
         if at.piece.high - at.piece.low <= self._least:
-            return self._open(at, codes), []
+            return OpenLeaf(at.piece.low, at.piece.high), []
         return self._cut(at, codes, at.piece.middle, cuts)
 
     @staticmethod
@@ -363,15 +361,11 @@ class PieceTree:
         low, high = at.piece.low, at.piece.high
         for begin, end in self.curves.ends:
             if begin <= low and high <= end:
-                return self._open(at, codes), []
+                return OpenLeaf(low, high), []
             alpha = next((alpha for alpha in (begin, end) if low < alpha < high), None)
             if alpha is not None:
                 return self._cut(at, codes, alpha)
         return None
-
-    @staticmethod
-    def _open(at: ExaminedPiece, codes: Codes, forces: Floats | None = None) -> OpenLeaf:
-        return OpenLeaf(at.piece.low, at.piece.high, codes, forces)
 
     def _certified(self, at: ExaminedPiece, codes: Codes) -> Done | None:
         """A certificate for all that is below an assignment, or a cut of a piece that is too long for one; or None.
@@ -430,7 +424,7 @@ class PieceTree:
         if isinstance(there, SpaceRoot):
             number = self.curves.met(piece.point, codes, there)
             if number is None and not self.curves.is_known(middle_of(piece, there)):
-                return self._open(at, codes, piece.forces(there.y).mid), []
+                return OpenLeaf(piece.low, piece.high, met=True), []
             passed = found if narrowed.low <= piece.middle <= narrowed.high else None
             if number is not None and passed is not None and narrowed.arc(codes, 2.0, passed) is not None:
                 passing = through(self.curves, narrowed, codes, passed, number, (piece.middle, codes, there))
