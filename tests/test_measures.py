@@ -11,10 +11,10 @@ from documents import ROOT
 
 #: A change that lowers a measure lowers its bound; one that has to raise it says why in its commit.
 BOUNDS = {
-    "code lines": 51_695,
-    "classes": 607,
-    "kinds of records": 19,
-    "parameters annotated Any": 107,
+    "code lines": 51_592,
+    "classes": 584,
+    "kinds of records": 18,
+    "parameters annotated Any": 106,
     "files": 271,
     "docstrings that begin with a pronoun": 0,
     "class names used twice or more": 0,
