@@ -7,7 +7,7 @@ import re
 import sys
 import warnings
 from collections.abc import Sequence
-from typing import Annotated, cast
+from typing import Annotated, Any, cast
 
 import typer
 
@@ -91,6 +91,8 @@ def run(arguments: Sequence[str] | None = None) -> int:
 def _in_a_sentence(error: typer.BadParameter) -> str:
     """Sentence on what typer could not make sense of, and what it would accept."""
     option = getattr(error, "option_name", None)
+    if isinstance(error.__cause__, ValueError) and hasattr(error.__cause__, "errors"):
+        return _value_refused(error, error.__cause__.errors()[0])
     if option is None or error.ctx is None or not hasattr(error, "possibilities"):
         # several sentences: "No such command 'rots'. Did you mean 'roots'?"
         return str(error.format_message()).replace(". Did", "; did")
@@ -102,6 +104,26 @@ def _in_a_sentence(error: typer.BadParameter) -> str:
     )
 
 
+#: What was expected where pydantic, which reads values for newer versions of typer, refuses one, by its kinds.
+_EXPECTED = {
+    "int_parsing": "a whole number",
+    "int_parsing_size": "a whole number of fewer digits",
+    "int_from_float": "a whole number",
+    "float_parsing": "a number",
+    "greater_than_equal": "at least {ge}",
+}
+
+
+def _value_refused(error: typer.BadParameter, told: dict[str, Any]) -> str:
+    """Sentence on the value of an option, from what pydantic says of it."""
+    names = [] if error.param is None else error.param.opts
+    name = next((name for name in names if name.startswith("--")), "an argument")
+    # of a choice it has the words of typer: "Value error, 'foo' is not one of 'tree', 'exhaustive'."
+    choices = re.search(r"not (one of .*?)\.?$", told["msg"])
+    known = _EXPECTED.get(told["type"], "what it takes ({msg})").format(msg=told["msg"], **told.get("ctx", {}))
+    return f"{name} is {told['input']!r}; expected {choices[1] if choices else known}"
+
+
 #: Names in Python that messages of the library use, and their names on the command line.
 _CALLED = (
     (r"\bbranch_graph\b", "enumsol graph"),
@@ -111,7 +133,12 @@ _CALLED = (
     (r" \(rigid_modes is given\)", ""),
     (r'\barithmetic(?:=| )"(\w+)"', r"--arithmetic \1"),
     (r'\barithmetic is "(\w+)"', r"--arithmetic is \1"),
-    (r"^time_limit is", "--time-limit is"),
+    (r"^time_limit is (.*) or None$", r"--time-limit is \1"),
+    (r"^proof_path (?=.*resumed$)", "--proof "),
+    (r"^merge is", "--merge is"),
+    (r"^step is (?=\d+; expected one of)", "--step is "),
+    (r"\bor step, the number\b", "or --step, the number"),
+    (r"or (an fclib file .*) \(enumsol\.fem makes problems .*\)$", r"\1, a deck (.inp) or a .toml file of a mesh"),
 )
 
 

@@ -283,10 +283,11 @@ def test_bad_problems_get_one_sentence(capsys, tmp_path, case):
         ("roots gallery:chain-2 --alpha 5 --csv /tmp", "--csv is /tmp, a directory; expected"),
         ("roots gallery:chain-2 --alpha 5 --csv - --json -", "--json and --csv are both -"),
         ("roots gallery:chain-2 --alpha 5 --proof -", "a proof is a binary file; expected the name"),
-        ("roots gallery:chain-2 --alpha 5 --time-limit -1", "--time-limit is -1.0; expected a positive"),
-        ("roots gallery:chain-2 --alpha 5 --max-nodes 0", "'--max-nodes'"),
-        ("roots gallery:chain-2 --alpha 5 --stop-after two", "'--stop-after'"),
-        ("roots gallery:chain-2 --alpha 5 --arithmetic sloppy", "'sloppy' is not one of"),
+        ("roots gallery:chain-2 --alpha 5 --time-limit -1", "is -1.0; expected a positive number of seconds\n"),
+        ("roots gallery:chain-2 --alpha 5 --time-limit soon", "--time-limit is 'soon'; expected a number\n"),
+        ("roots gallery:chain-2 --alpha 5 --max-nodes 0", "--max-nodes is '0'; expected at least 1\n"),
+        ("roots gallery:chain-2 --alpha 5 --stop-after two", "--stop-after is 'two'; expected a whole number\n"),
+        ("roots gallery:chain-2 --alpha 5 --arithmetic sloppy", "--arithmetic is 'sloppy'; expected one of 'verified'"),
         ("roots gallery:chain-2 --alpha 5 --method exhaustive", "for the oracle"),
         ("roots gallery:one-node-3d --alpha 0 --arithmetic exact", "--arithmetic is exact, which problems in 3D"),
         ("roots gallery:one-node-3d --alpha 0 --method exhaustive", "method is"),
@@ -308,6 +309,9 @@ def test_bad_calls_get_one_sentence(capsys, tmp_path, monkeypatch, command, part
 
 
 def test_a_file_that_is_no_problem_file(capsys, tmp_path):
+    (tmp_path / "p.proof").touch()
+    named = "an fclib file (.h5, .hdf5), a deck (.inp) or a .toml file of a mesh"
+    assert_refused(*run(capsys, "roots", tmp_path / "p.proof", "--alpha", 5), "its name ends in '.proof'", named)
     for content in (b"", b"just text", b"PK\x03\x04 and no more", b"\x93NUMPY"):
         file = tmp_path / "p.npz"
         file.write_bytes(content)

@@ -45,11 +45,11 @@ def test_a_history_of_a_deck_with_two_steps(here, capsys):
 
 def test_of_several_steps_one_is_named(here, capsys):
     assert main(["roots", "model.inp"]) == 2
-    assert "model.inp has 2 steps; expected a history of them (enumsol history)" in capsys.readouterr().err
+    assert "has 2 steps; expected a history of them (enumsol history), or --step, the" in capsys.readouterr().err
     assert main(["roots", "model.inp", "--step", "2"]) == 0
     assert "1 root (verified" in capsys.readouterr().out
     assert main(["roots", "model.inp", "--step", "3"]) == 2
-    assert "expected one of 1 to 2" in capsys.readouterr().err
+    assert "error: --step is 3; expected one of 1 to 2" in capsys.readouterr().err
     assert main(["history", "model.inp", "--step", "2"]) == 2
     assert "--step is given with a history of a deck" in capsys.readouterr().err
 

@@ -47,7 +47,7 @@ def test_what_is_refused(capsys, tmp_path):
     run(capsys, *WEDGE, "--proof", proof)
     before = proof.read_bytes()
     other = ("roots", "gallery:wedge-8-5", "--alpha", "5/2", "--proof", proof, "--resume")
-    assert_refused(*run(capsys, *other), "belongs to another alpha ('3'; here '5/2')")
+    assert_refused(*run(capsys, *other), f"--proof {proof} belongs to another alpha ('3'; here '5/2')")
     assert proof.read_bytes() == before
 
 
