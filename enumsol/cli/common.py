@@ -267,6 +267,37 @@ def so_far(search: Callable[[], T]) -> tuple[T | Any, EnumsolError | None]:
         return error.partial, error
 
 
+def check_motions(problem: AnyProblem) -> None:
+    """Refuse verdicts on solutions of a problem before these are searched.
+
+    Raises
+    ------
+    InvalidArgumentError
+        It has no mass, or its friction depends on the solution.
+    """
+    from enumsol.roots.stability import Stabilities  # numpy and scipy: not for --help
+
+    Stabilities(problem)
+
+
+def judged(found: T, judge: Callable[[], object]) -> T:
+    """The result of a search, after its verdicts are found as well.
+
+    Raises
+    ------
+    Interrupted, OutputError
+        By Ctrl-C, or where a proof of the verdicts cannot be written; ``partial`` is what the search found.
+    """
+    try:
+        with Display("stability"):
+            judge()
+    except KeyboardInterrupt:
+        raise Interrupted("the search for verdicts was interrupted", found) from None
+    except OutputError as error:
+        raise OutputError(str(error), found) from error
+    return found
+
+
 def finish(ended: EnumsolError | None, status: ExitStatus) -> NoReturn:
     """End the command: by what ended its search early, or with a status."""
     if isinstance(ended, Interrupted):

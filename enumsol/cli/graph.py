@@ -13,7 +13,7 @@ import typer
 
 from enumsol.cli import common, options, output
 from enumsol.cli.progress import Display, search_display
-from enumsol.errors import Interrupted, InvalidArgumentError, MissingDependencyError
+from enumsol.errors import InvalidArgumentError, MissingDependencyError
 from enumsol.support.messages import counted
 
 if TYPE_CHECKING:
@@ -215,22 +215,15 @@ def _told(
     problem: AnyProblem, stability: bool | None, search: Callable[[], BranchGraph]
 ) -> tuple[BranchGraph, EnumsolError | None]:
     """A graph with its verdicts: those that were asked for, or those that hardly take time; and what ended it."""
-    from enumsol.branches.stability import ArcStabilities  # numpy: not for --help
-
     if stability:
-        ArcStabilities(problem)  # refused before the search
+        common.check_motions(problem)
     found, ended = common.so_far(search)
     if ended is not None or stability is False or not (stability or _has_mass(problem)):
         return found, ended
     if not stability and _work(problem, found) > _SHARE * found.stats.nodes:
         common.note("which arcs run away would take more than a tenth of the work on the graph; --stability finds it")
         return found, ended
-    try:
-        with Display("stability"):
-            found.stability()
-    except KeyboardInterrupt:
-        ended = Interrupted("the search for verdicts was interrupted", found)
-    return found, ended
+    return common.so_far(lambda: common.judged(found, found.stability))
 
 
 def _work(problem: AnyProblem, found: BranchGraph) -> int:

@@ -12,7 +12,7 @@ from enumsol.cli.common import deck_named, is_deck, step_chosen
 from enumsol.cli.options import PLOT, Arithmetic, Count, OutputFile, PlotFile, Problem, Quiet, Seconds, Title, Units
 from enumsol.cli.progress import Display
 from enumsol.errors import InvalidArgumentError
-from enumsol.support.messages import counted
+from enumsol.support.messages import about, counted
 
 if TYPE_CHECKING:
     from enumsol.loading.growing import HistoryProgress
@@ -90,9 +90,11 @@ def history(
     names = common.units_of(problem, units)
     limits = {"max_branches": max_branches, "max_nodes": max_nodes, "time_limit": time_limit}
     options = {"arithmetic": arithmetic, "follow": follow, "merge": merge, "refine": refine, **limits}
+    if stability:
+        common.check_motions(body)
     found, ended = common.so_far(lambda: _search(body, given, jobs, options))
     if stability and ended is None:
-        found.stability()
+        found, ended = common.so_far(lambda: common.judged(found, found.stability))
 
     def write_page(path: str) -> None:
         from enumsol.report import write_report  # numpy: not for --help
@@ -143,9 +145,9 @@ def _steps(problem: str, steps: str | None) -> Any:
             return read_steps(steps)
         return [part.strip() for part in steps.split(",")]
     file = problem if steps is None else steps
-    said = common.described(file).get("steps")
+    said = _tables(file).get("steps")
     if said is None:
-        what = "is missing" if steps is None else f"{steps} has no steps or cannot be read"
+        what = "is missing" if steps is None else f"{steps} has no steps"
         raise InvalidArgumentError(
             f"--steps {what}; expected a CSV file, a list of alphas, or steps in a {common.TOML} file"
         )
@@ -154,6 +156,16 @@ def _steps(problem: str, steps: str | None) -> Any:
     if isinstance(said, list) and said and all(isinstance(item, dict) for item in said):
         return _of_scene(problem, said)
     return said
+
+
+def _tables(file: str) -> dict[str, Any]:
+    """Keys and values of a TOML file; a problem in another file has none."""
+    if not file.endswith(common.TOML):
+        return {}
+    from enumsol.fem.mesh_problems import toml_options  # as above
+
+    with about(file, InvalidArgumentError):
+        return toml_options(Path(file))
 
 
 def _of_scene(problem: str, tables: list[dict[str, Any]]) -> list[LoadStep]:

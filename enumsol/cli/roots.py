@@ -101,6 +101,8 @@ class Search:
         if self.start_file is not None and not common.is_deck(name):
             raise InvalidArgumentError(f"--start is given, but {name} is no deck; expected an .inp PROBLEM")
         output.check_scripts(self.report_file, problem)
+        if self.stability:
+            common.check_motions(problem)
         units = common.units_of(name, self.units)
         found, ended = common.so_far(lambda: self._found(problem, alpha))
         output.deliver(
@@ -140,12 +142,14 @@ class Search:
         asked |= {"stop_after": 2 if self.unique else self.stop_after, "proof_path": self.proof_file}
         with common.workers(self.jobs) as executor, search_display() as display:
             found = enumerate_roots(problem, alpha, executor=executor, progress=display, **asked)
-        if self.stability and self.proof_file is not None and found.proof is not None and len(found):
+        return common.judged(found, lambda: self._judge(found)) if self.stability else found
+
+    def _judge(self, found: RootSet) -> None:
+        if self.proof_file is not None and found.proof is not None and len(found):
             # in the place of the proof of the roots, which it holds
             found.stability_proof().save(self.proof_file)
-        elif self.stability:
+        else:
             found.stability()
-        return found
 
 
 @options.with_options(*options.options_of(Search), after=2)

@@ -475,6 +475,8 @@ def in_folder(source: object, folder: Path) -> Any:
             else in_folder(value, folder)
             for name, value in source.items()
         }
+    if source is None:
+        raise InvalidArgumentError("mesh is missing; expected the name of a mesh file in quotes")
     return folder / file_path(source, "mesh", "the name of a mesh file in quotes")
 
 

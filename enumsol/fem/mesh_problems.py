@@ -371,7 +371,7 @@ def read_mesh_scene(path: str | os.PathLike[str]) -> Scene:
 def _of_file(path: object, made: Callable[[Scene], T]) -> T:
     place = file_path(path, "path")
     with about(place, InvalidArgumentError, InvalidProblemError, made=InvalidProblemError):
-        options = _toml(place)
+        options = toml_options(place)
         given = in_folder(options.pop("mesh", None), place.parent)
         options.pop("steps", None)  # of enumsol history
         checked_units(options.pop("units", None))
@@ -382,7 +382,14 @@ def _of_file(path: object, made: Callable[[Scene], T]) -> T:
         return made(mesh_scene(source, **options))
 
 
-def _toml(place: Path) -> dict[str, Any]:
+def toml_options(place: Path) -> dict[str, Any]:
+    """The keys and values in a TOML file.
+
+    Raises
+    ------
+    InvalidArgumentError
+        It cannot be read.
+    """
     if (found := unreadable(place)) is not None:
         raise InvalidArgumentError(f"{found}; expected a TOML file of options")
     with place.open("rb") as file:

@@ -91,7 +91,7 @@ def test_steps_stand_in_the_toml_file_of_a_mesh(capsys, tmp_path):
     assert run(capsys, "history", place, "--steps", tmp_path / "steps.toml")[1] == out
     refusal = "has tables [[steps]], and gallery:one-node-6.1 has no mesh"
     assert_refused(*run(capsys, *NODE, "--steps", tmp_path / "steps.toml"), refusal)
-    assert_refused(*run(capsys, *NODE, "--steps", tmp_path / "none.toml"), "none.toml has no steps or cannot be read")
+    assert_refused(*run(capsys, *NODE, "--steps", tmp_path / "none.toml"), "none.toml: there is no such file")
 
 
 def test_what_is_left_open_is_an_exit_status(capsys, wedge):
@@ -105,7 +105,11 @@ def test_what_is_left_open_is_an_exit_status(capsys, wedge):
 def test_bad_input_is_one_sentence(capsys, tmp_path):
     assert_refused(*run(capsys, *NODE), "--steps is missing; expected a CSV file")
     (tmp_path / "no.toml").write_text("steps = [1")
+    assert_refused(*run(capsys, "history", tmp_path / "no.toml"), "no.toml: it is not a TOML file (")
+    assert_refused(*run(capsys, *NODE, "--steps", tmp_path / "no.toml"), "no.toml: it is not a TOML file (")
+    (tmp_path / "no.toml").write_text("stps = [1]")
     assert_refused(*run(capsys, "history", tmp_path / "no.toml"), "--steps is missing; expected a CSV file")
+    assert_refused(*run(capsys, *NODE, "--steps", tmp_path / "no.toml"), "no.toml has no steps; expected a CSV file")
     assert_refused(*run(capsys, *NODE, "--steps", "1,x"), "step 2: alpha is 'x'")
     assert_refused(*run(capsys, *NODE, "--steps", tmp_path / "none.csv"), "cannot be read")
     table = tmp_path / "steps.csv"

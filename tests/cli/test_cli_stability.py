@@ -10,7 +10,7 @@ from command_line import assert_refused, printed, run
 
 import enumsol
 from enumsol import gallery
-from enumsol.cli import graph as command
+from enumsol.cli import common, graph as command
 
 GRAPH = ("graph", "gallery:one-node-6.1", "--from", 0, "--to", 3)
 QUIET, AWAY = "does not run away", "runs away"
@@ -63,6 +63,16 @@ def test_without_a_mass_nothing_is_said_or_it_is_refused(capsys, tmp_path):
     assert_refused(*run(capsys, *space), "no mass and no mesh")
 
 
+@pytest.mark.parametrize("verb", [("roots", "--alpha", 1), ("history", "--steps", "1,2")])
+def test_without_a_mass_it_is_refused_before_the_search(capsys, tmp_path, monkeypatch, verb):
+    problem = enumsol.ContactProblem(np.eye(2), [[1, 0]], [[0, 1]], [1, 2], friction=0.5)
+    enumsol.write_problem(problem, tmp_path / "bare.npz")
+    monkeypatch.setattr(common, "so_far", lambda _: pytest.fail("there was a search"))
+    call = (verb[0], tmp_path / "bare.npz", *verb[1:], "--stability", "--proof", tmp_path / "bare.proof")
+    assert_refused(*run(capsys, *call), "no mass and no mesh")
+    assert not (tmp_path / "bare.proof").exists()
+
+
 def test_tables_can_leave_out_what_runs_away(capsys):
     table = ("table", "gallery:one-node-6.1", "--alphas", "1,5", "--without", "running away")
     text = printed(capsys, *table)
@@ -73,12 +83,25 @@ def test_tables_can_leave_out_what_runs_away(capsys):
     # floats prove no verdict
     fast = printed(capsys, *table, "--arithmetic", "fast", status=3)
     assert "complete: no (at 2 of 2 alphas: 1, 5)" in fast
-    assert_refused(*run(capsys, *table[:-1], "sliding"), "'sliding' is not one of 'running away'")
+    assert_refused(*run(capsys, *table[:-1], "sliding"), "--without is 'sliding'; expected one of 'running away'")
 
 
-def test_ctrl_c_keeps_the_graph(capsys, monkeypatch):
+def test_ctrl_c_keeps_what_was_found(capsys, monkeypatch):
     def interrupted(self):
         raise KeyboardInterrupt
 
-    monkeypatch.setattr(enumsol.BranchGraph, "stability", interrupted)
-    assert "complete: yes (proven)" in printed(capsys, *GRAPH, "--stability", status=130)
+    for kind in (enumsol.BranchGraph, enumsol.RootSet, enumsol.History):
+        monkeypatch.setattr(kind, "stability", interrupted)
+    for call in (GRAPH, ("roots", GRAPH[1], "--alpha", 1), ("history", GRAPH[1], "--steps", "1,2")):
+        assert "complete: yes (proven" in printed(capsys, *call, "--stability", status=130)
+
+
+def test_roots_are_said_where_the_proof_of_their_verdicts_cannot_be_written(capsys, monkeypatch, tmp_path):
+    def full(*_):
+        raise enumsol.OutputError("proof cannot be written (No space left on device)")
+
+    monkeypatch.setattr(enumsol.RootSet, "stability_proof", full)
+    call = ("roots", GRAPH[1], "--alpha", 1, "--stability", "--proof", tmp_path / "node.proof")
+    status, out, err = run(capsys, *call)
+    assert (status, "complete: yes (proven" in out) == (74, True)
+    assert "No space left" in err

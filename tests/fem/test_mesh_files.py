@@ -217,7 +217,7 @@ def test_a_toml_file_is_a_call(toml, tmp_path):
         ("young", "yuong", "there is no option 'yuong'; did you mean young?"),
         ("clamp", "xyzzy", "there is no option 'xyzzy'; expected some of mesh, young"),
         ("young = 2.5\n", "", "young is missing"),
-        ('mesh = "body.msh"\n', "", "mesh is a NoneType; expected the name of a mesh file in quotes"),
+        ('mesh = "body.msh"\n', "", "mesh is missing; expected the name of a mesh file in quotes"),
         ("body.msh", "other.msh", r"other\.msh: there is no such file; expected a mesh"),
         ("2.5", "'2.5'", r"young is '2\.5'; expected a finite number"),
         ("2.5", "true", "young is True; expected"),
