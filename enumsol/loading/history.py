@@ -48,7 +48,13 @@ _OF_ROOT, _OF_ROOTS = ("index", "regular", "margin"), ("stopped", "at_least", "c
 
 
 def save_history(data: history_data.HistoryData, file: str | Path) -> None:
-    """Write a history (see History.save)."""
+    """Write the history, with the proofs of its searches, as JSON; the problem is not part of the file.
+
+    Raises
+    ------
+    InvalidArgumentError
+        The file cannot be written.
+    """
     record = {
         "format": FORMAT,
         "version": VERSION,
@@ -301,13 +307,7 @@ class History(history_data.HistoryData):
         """True if it is proven that these are all histories: every step complete, every root followed to the end."""
         return self.arithmetic != "fast" and not self.reasons
 
-    @property
-    def proof(self) -> Proof | None:
-        """Proof of the whole for ``enumsol.verify``: all searches, their starts, and which follows which.
-
-        None in fast and exact arithmetic, and where there was no search at all.
-        """
-        return history_data.history_proof(self)
+    proof = property(history_data.history_proof)
 
     # -- the graph -------------------------------------------------------------------------------------------------
 
@@ -451,16 +451,6 @@ class History(history_data.HistoryData):
 
         return kept(draw_history(self, x, y, ax, checked_units(units)), file)
 
-    def save(self, file: str | Path) -> None:
-        """Write the history, with the proofs of its searches, as JSON; the problem is not part of the file.
-
-        Raises
-        ------
-        InvalidArgumentError
-            The file cannot be written.
-        """
-        save_history(self, file)
-
     @classmethod
     def load(cls, file: str | Path, problem: AnyProblem) -> History:
         """Read a history that `save` wrote, of this problem.
@@ -478,8 +468,6 @@ class History(history_data.HistoryData):
         """Text that is printed, with units of forces and lengths if they are given."""
         return history_data.history_text(self, checked_units(units))
 
-    def __repr__(self) -> str:
-        return self.text()
-
-    def _repr_html_(self) -> str:
-        return history_data.history_html(self)
+    save = save_history
+    __repr__ = history_data.history_text
+    _repr_html_ = history_data.history_html

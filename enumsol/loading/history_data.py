@@ -364,7 +364,10 @@ class HistoryData:
 
 
 def history_proof(data: HistoryData) -> Proof | None:
-    """The proof; None where a search has none, as in fast and exact arithmetic and after an interruption."""
+    """Proof of the whole for ``enumsol.verify``: all searches, their starts, and which follows which.
+
+    None where a search has none, as in fast and exact arithmetic and after an interruption, and without any search.
+    """
     if not data.all_stages or any(stage.roots.proof is None for stage in data.all_stages):
         return None
     following = _following(data)
