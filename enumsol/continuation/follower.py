@@ -37,7 +37,8 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
 
     from enumsol.continuation.newton import Start
-    from enumsol.support.array_types import Codes, Floats
+    from enumsol.continuation.recorder import Landmark
+    from enumsol.support.array_types import Floats
     from enumsol.support.deadlines import Ending
 
 _Path = TypeVar("_Path")
@@ -91,17 +92,12 @@ class Follower(Generic[_Path]):
         The start and the direction in which to leave it.
     sign : {+1, -1}
         Orientation kept along the path.
-    visited : list of (x, codes, True)
-        Points of other paths (see Landmarks).
+    visited : sequence of Landmark
+        Points of other paths.
     """
 
     def __init__(
-        self,
-        make: Callable[..., _Path],
-        start: Start,
-        first: TangentPoint,
-        sign: int,
-        visited: Sequence[tuple[Floats, Codes, bool]] = (),
+        self, make: Callable[..., _Path], start: Start, first: TangentPoint, sign: int, visited: Sequence[Landmark] = ()
     ) -> None:
         self._make, self._smooth_path = make, start.smooth_path
         self.equation, self.options, self.interval = start.equation, start.options, start.interval

@@ -41,9 +41,10 @@ if TYPE_CHECKING:
 
     import pandas as pd
 
+    from enumsol.continuation.recorder import Landmark
     from enumsol.continuation.scaled_equation import ScaledEquation, SmoothPath
     from enumsol.model.problem3d import AnyProblem
-    from enumsol.support.array_types import AlphaLike, Codes, Floats, Integers, NDArray
+    from enumsol.support.array_types import AlphaLike, Floats, Integers, NDArray
 
 
 #: Version of the files of paths.
@@ -579,7 +580,7 @@ def follow(
     return Follower(Path, first, point, sign, list(_points_of(first.equation, visited))).run()
 
 
-def _points_of(equation: ScaledEquation, visited: Sequence[Path]) -> Iterator[tuple[Floats, Codes, bool]]:
+def _points_of(equation: ScaledEquation, visited: Sequence[Path]) -> Iterator[Landmark]:
     """Starts, transition points and ends of other paths, with the statuses on both sides."""
     for path in visited:
         for k, kind in enumerate(path.kinds):

@@ -25,6 +25,9 @@ if TYPE_CHECKING:
     from enumsol.roots.local_branch import LocalBranchTest
     from enumsol.support.array_types import Codes, Floats
 
+    #: A point x, its codes, and whether it is one of another path.
+    Landmark = tuple[Floats, Codes, bool]
+
 
 @dataclass(frozen=True)
 class _Recorded:
@@ -126,14 +129,13 @@ class Landmarks:
         The start of the path.
     tolerance : float
         Accuracy to which points are located.
-    points : list of (x, codes, foreign)
-        ``foreign``: of another path.
+    points : list of Landmark
     """
 
     equation: ScaledEquation
     origin: TangentPoint
     tolerance: float
-    points: list[tuple[Floats, Codes, bool]]
+    points: list[Landmark]
 
     def add(self, point: TangentPoint) -> None:
         """Add a transition point of the path itself."""
