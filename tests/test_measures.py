@@ -11,8 +11,8 @@ from documents import ROOT
 
 #: A change that lowers a measure lowers its bound; one that has to raise it says why in its commit.
 BOUNDS = {
-    "code lines": 51_606,
-    "classes": 584,
+    "code lines": 51_637,
+    "classes": 585,
     "kinds of records": 18,
     "parameters annotated Any": 106,
     "files": 271,

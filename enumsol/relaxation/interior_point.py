@@ -1,4 +1,4 @@
-"""Relaxations by an interior-point method, for nodes on which the active-set method gives no answer."""
+"""Slower relaxations, for nodes on which the active-set method gives no answer, or none that balls prove."""
 
 from __future__ import annotations
 
@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 import scipy.sparse as sp
 from scipy.linalg import solve_triangular
+from scipy.optimize import nnls
 
 from enumsol.model.statuses import CONTACT, UNDECIDED
 from enumsol.relaxation.engine import EQUALITY, PRUNE_MARGIN, Relaxation, row_terms
@@ -23,6 +24,8 @@ class InteriorPointEngine:
 
     name = "clarabel"
     solves_children = False
+    #: Its multipliers are smaller than those of other engines, and balls may prove more of them.
+    softens = False
 
     def __init__(self, system: ScaledSystem) -> None:
         self.system = system
@@ -88,6 +91,47 @@ class InteriorPointEngine:
         # an exact ray has curvature 0: stop where the bound is large enough
         needed = 2.0 * (0.25 * float(g @ g) + PRUNE_MARGIN) / slope
         return values * (min(needed, 0.5 * slope / curvature) if curvature > 0 else needed)
+
+
+class SoftenedEngine(InteriorPointEngine):
+    """Relaxations whose rows may be violated at a price, so that their multipliers z are small (theory, section 6.2).
+
+    They maximise the bound (6.1) less loss |z|^2. Where that fails, the interior-point method gives the answer.
+
+    Parameters
+    ----------
+    system : ScaledSystem
+    loss : float
+        How much of a bound is lost to multipliers of length one, times their length squared; positive.
+    """
+
+    name = "softened"
+    softens = True
+
+    def __init__(self, system: ScaledSystem, loss: float) -> None:
+        super().__init__(system)
+        self._loss = loss
+        self._lower_normals, self._lower_g = self.lower(self.normals.T).T, self.lower(system.g)
+        #: Derivatives of (6.1) at z = 0.
+        self._slopes = self.offsets - 0.5 * self._lower_normals @ self._lower_g
+
+    def solved(self, on: dict[int, int]) -> Relaxation:
+        """The relaxation with these rows and their modes, solved from scratch."""
+        equal = [row for row, mode in on.items() if mode == EQUALITY]
+        order, k = np.array(equal + [row for row, mode in on.items() if mode != EQUALITY], dtype=np.intp), len(equal)
+        lower = self._lower_normals[order]
+        # the bound less the loss is slopes'z - |R z|^2 / 4, up to a constant
+        R: Floats = np.linalg.qr(np.vstack([lower.T, 2.0 * np.sqrt(self._loss) * np.eye(len(order))])).R
+        try:
+            target = 2.0 * solve_triangular(R, self._slopes[order], trans="T")
+            other, _ = nnls(R[k:, k:], target[k:], maxiter=10 * len(order))
+            first = solve_triangular(R[:k, :k], target[:k] - R[:k, k:] @ other)
+        except (np.linalg.LinAlgError, RuntimeError, ValueError):
+            return super().solved(on)  # R is singular, or there were too many steps, or numbers overflowed
+        values = np.concatenate([first, other])
+        forces = 0.5 * solve_triangular(self.system.cholesky, self._lower_g + values @ lower, lower=True, trans="T")
+        bound = self.dual_bound(order, values) - self._loss * float(values @ values)
+        return _InteriorPointRelaxation(self, on, order, values, bound, forces)
 
 
 class _InteriorPointRelaxation:

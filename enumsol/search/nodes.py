@@ -24,6 +24,7 @@ if TYPE_CHECKING:
 
     from enumsol.condensation.condensed import ScaledSystem
     from enumsol.relaxation.engine import Engine, Relaxation
+    from enumsol.relaxation.interior_point import InteriorPointEngine
     from enumsol.search.certifiers.protocol import Led
     from enumsol.support.array_types import Codes
     from enumsol.trusted.quadratic_forms import EnclosedForm, QuadraticForm
@@ -60,7 +61,7 @@ class Relaxations:
     forms : Forms or None
         What may be bounded in place of the energy.
     fallback : callable or None
-        Gives a slower engine for relaxations that stall.
+        Gives a slower engine for relaxations that stall, or whose multipliers prove nothing.
     """
 
     def __init__(
@@ -69,7 +70,7 @@ class Relaxations:
         splitting: Splitting,
         p: int,
         forms: Forms | None = None,
-        fallback: Callable[[], Engine] | None = None,
+        fallback: Callable[[], InteriorPointEngine] | None = None,
     ) -> None:
         self.engine, self.splitting, self.forms, self._make_fallback = engine, splitting, forms, fallback
         self.nothing: Codes = (UNDECIDED,) * p
@@ -89,9 +90,10 @@ class Relaxations:
         """The relaxation of a partial assignment with the energy, if it is solved and leaves a minimiser."""
         return _usable(self._root(codes, self.engine))
 
-    def fallen_back(self, codes: Codes) -> Relaxation | None:
-        """The relaxation by the slower engine; None when that gives no answer either."""
-        relaxation = None if self._fallback is None else self._root(codes, self._fallback)
+    def fallen_back(self, codes: Codes, failed: Relaxation) -> Relaxation | None:
+        """The relaxation by the slower engine; None when that gives no answer either, or none that proves more."""
+        engine = self._fallback
+        relaxation = None if engine is None or not (failed.stalled or engine.softens) else self._root(codes, engine)
         return None if relaxation is None or relaxation.stalled else relaxation
 
     def planted(self, items: Sequence[TreeNode]) -> list[TreeNode]:
@@ -130,7 +132,7 @@ class Relaxations:
         return relaxation
 
     @cached_property
-    def _fallback(self) -> Engine | None:
+    def _fallback(self) -> InteriorPointEngine | None:
         return None if self._make_fallback is None else self._make_fallback()
 
 

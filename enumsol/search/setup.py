@@ -33,7 +33,7 @@ if TYPE_CHECKING:
     from enumsol.condensation.enclosure import EnclosedSystem, RigidRows
     from enumsol.model.problem3d import AnyProblem
     from enumsol.proof.writer import BegunProof, Recorder
-    from enumsol.relaxation.engine import Engine
+    from enumsol.relaxation.interior_point import InteriorPointEngine
     from enumsol.search.certifiers.protocol import Bound, Certifier
     from enumsol.search.nodes import Forms, TreeCloser
     from enumsol.search.outcome import SearchLimits, SearchProgress
@@ -295,8 +295,8 @@ class SearchSetup(ABC):
         """Children and rows of partial assignments."""
 
     @property
-    def _fallback(self) -> Callable[[], Engine] | None:
-        """Makes a slower engine for relaxations that stall; None where there is none."""
+    def _fallback(self) -> Callable[[], InteriorPointEngine] | None:
+        """Makes a slower engine for relaxations that stall or prove nothing; None where there is none."""
         return None
 
     @abstractmethod

@@ -19,7 +19,7 @@ from enumsol.proof.records import Limits, Tree
 from enumsol.proof.writer import Recorder
 from enumsol.relaxation.active_set import ActiveSetEngine
 from enumsol.relaxation.engine import PRUNE_MARGIN, Engine, not_compiled
-from enumsol.relaxation.interior_point import InteriorPointEngine
+from enumsol.relaxation.interior_point import InteriorPointEngine, SoftenedEngine
 from enumsol.search.certifiers.exclusions import Exclusions
 from enumsol.search.certifiers.protocol import Bound, Certifier, UndecidedPart, margin_of_form, solve_or_open
 from enumsol.search.certifiers.verified import VerifiedCertifier
@@ -274,7 +274,10 @@ class Solvers(SearchSetup):
         return make_engine(self.relaxed, self.engine)
 
     @property
-    def _fallback(self) -> Callable[[], Engine]:
+    def _fallback(self) -> Callable[[], InteriorPointEngine]:
+        if self.arithmetic == "verified" and self.problem.held and (enclosed := self.enclosed) is not None:
+            # an error of S y of form_error |y| costs this much by (6.3) of theory
+            return partial(SoftenedEngine, self.relaxed, 0.25 * enclosed.form_error**2 / enclosed.smallest_eigenvalue)
         return partial(InteriorPointEngine, self.relaxed)
 
     def _solved(self, system: ScaledSystem, near: Point | None) -> tuple[list[Codes], Point] | None:

@@ -3,7 +3,8 @@
 Every node of the tree is a partial assignment of statuses. Its relaxation is solved, warm-started from its parent; it
 is pruned when the certifier accepts the multipliers as a proof that it holds no solution, branched on otherwise, and
 handed to the certifier as a complete selection when every contact node is decided. The leaves cover all selections by
-construction: an engine that fails is replaced by the fallback, and where that fails too the node is branched on.
+construction: an engine that fails, or whose multipliers the certifier does not accept, is replaced by the fallback, and
+where that fails too the node is branched on.
 
 Presolve comes first: contact nodes that one dual step proves open or in contact are branched on before all others, so
 that everything below knows them. What is left when a search is stopped stays undecided, but for complete selections
@@ -368,14 +369,16 @@ class TreeSearch:
             return []
         relaxation: Relaxation | None
         relaxation = solved = self.relax(item)
-        if solved.stalled:
-            # the fallback costs more than a try
-            if self.closed(item, None):
-                return []
-            outcome.fallback_qps += 1
-            relaxation = self.relaxations.fallen_back(codes)
-        if relaxation is not None and relaxation.pruned and self.excluded(item, relaxation):
+        if solved.pruned and self.excluded(item, solved):
             return []
+        if solved.stalled or solved.pruned:
+            # no answer, or none that is proven; the fallback costs more than a try
+            if solved.stalled and self.closed(item, None):
+                return []
+            outcome.fallback_qps += solved.stalled
+            relaxation = self.relaxations.fallen_back(codes, solved)
+            if relaxation is not None and relaxation.pruned and self.excluded(item, relaxation):
+                return []
         usable = relaxation if relaxation is not None and not relaxation.pruned else None
         if self.closed(item, usable):
             return []

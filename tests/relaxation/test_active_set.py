@@ -1,4 +1,4 @@
-"""The compiled dual active-set method against an interior-point solver, and the bounds its multipliers prove."""
+"""Solvers of relaxations against each other, and the bounds that their multipliers prove."""
 
 import numpy as np
 import pytest
@@ -19,7 +19,7 @@ from enumsol.relaxation.engine import (
     row_normals,
     status_rows,
 )
-from enumsol.relaxation.interior_point import InteriorPointEngine
+from enumsol.relaxation.interior_point import InteriorPointEngine, SoftenedEngine
 
 
 def random_system(rng, p):
@@ -124,6 +124,35 @@ def test_multipliers_prove_the_bound(engine, seed):
                 assert bound > 0.5 * PRUNE_MARGIN
                 pruned += 1
     assert pruned > some(10, of=20)
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_softened_rows_prove_a_bound_that_is_less_by_what_large_multipliers_lose(seed):
+    rng, loss = np.random.default_rng(seed + 60), 1e-6
+    pruned = 0
+    for _ in range(20):
+        system = random_system(rng, int(rng.integers(1, 9)))
+        for codes, _ in descend(rng, system, ActiveSetEngine(system)):
+            # a child has its parent's rows besides
+            node, softened = (
+                engine.root(*rows_of(codes, system.F))
+                for engine in (ActiveSetEngine(system), SoftenedEngine(system, loss))
+            )
+            (_, values), (_, others) = softened.multipliers(), node.multipliers()
+            bound = proven(system, codes, softened) - loss * values @ values
+            assert bound == pytest.approx(softened.bound, rel=1e-6, abs=1e-8)
+            # no other multipliers prove more after their loss
+            other = proven(system, codes, node) - loss * others @ others
+            assert bound > other - 1e-6 * abs(other) - 1e-8
+            pruned += softened.pruned
+            _, smaller = SoftenedEngine(system, 100 * loss).root(*rows_of(codes, system.F)).multipliers()
+            assert np.linalg.norm(smaller) < np.linalg.norm(values) + 1e-9
+            # the minimiser without rows but with their multipliers
+            normals, _ = dense_rows(system)
+            rows, values = softened.multipliers()
+            at_least = np.linalg.solve(system.S, system.g + normals[rows].T @ values) / 2
+            np.testing.assert_allclose(softened.forces, at_least, atol=1e-7 * (1 + np.abs(at_least).max()))
+    assert pruned > 5
 
 
 @pytest.mark.parametrize("seed", range(4))

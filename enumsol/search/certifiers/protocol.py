@@ -80,7 +80,7 @@ class Escalations:
     rationals : int
         Decided in rational arithmetic.
     refined : int
-        Prunings whose inequality failed; they were branched on.
+        Prunings whose inequality failed; smaller multipliers proved them, or they were branched on.
     undecided : int
     """
 
