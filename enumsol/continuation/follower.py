@@ -214,7 +214,7 @@ class Follower(Generic[_Path]):
             return None
         if not self.options.check_steps:
             return self._unchecked(correction, h)
-        end = self._end_point(correction)
+        end = self._end_point(self._corrected(correction))
         if end is None:
             return None
         if end.codes == self.current.codes:
@@ -224,19 +224,22 @@ class Follower(Generic[_Path]):
         kink = confirm(self.equation, self.current, end, self.sign, self.options.transition_tolerance)
         return None if kink is None else _Step(end, kink, h, correction.count)
 
-    def _end_point(self, correction: Correction) -> TangentPoint | None:
+    def _corrected(self, correction: Correction) -> TangentPoint | None:
+        """A corrected point with its statuses and the tangent there; None where it has none."""
+        tolerance = max(STATUS_TOLERANCE, 10 * correction.residual)
+        codes = self.equation.codes(correction.x, self.current.codes, tolerance)
+        tangent = curve_tangent(self.equation, codes, correction.x, self.sign)
+        return None if tangent is None else TangentPoint(correction.x, codes, tangent)
+
+    def _end_point(self, near: TangentPoint | None) -> TangentPoint | None:
         """The solution beside a corrected point, converged to rounding; None when it is not admissible.
 
         H is small near the tip of a fold even without a solution: only the conditions of a converged point decide.
         """
-        equation = self.equation
-        codes = equation.codes(correction.x, self.current.codes, max(STATUS_TOLERANCE, 10 * correction.residual))
-        tangent = curve_tangent(equation, codes, correction.x, self.sign)
-        if tangent is None:
+        if near is None:
             return None
-        row = equation.metric @ tangent
-        tolerance = self.options.transition_tolerance
-        x = smooth_newton(equation, codes, correction.x, row, float(row @ correction.x), tolerance)
+        equation, codes, row = self.equation, near.codes, self.equation.metric @ near.tangent
+        x = smooth_newton(equation, codes, near.x, row, float(row @ near.x), self.options.transition_tolerance)
         # conditions may be negative by this much at a point that is converged to rounding
         if x is None or np.min(equation.slacks(codes, x)) < -1e-12:
             return None
@@ -245,13 +248,9 @@ class Follower(Generic[_Path]):
 
     def _unchecked(self, correction: Correction, h: float) -> _Step | None:
         """The step as the paper's Algorithm 5.1 takes it: any converged correction, with the tangent of its last."""
-        tolerance = max(STATUS_TOLERANCE, 10 * correction.residual)
-        codes = self.equation.codes(correction.x, self.current.codes, tolerance)
-        tangent = curve_tangent(self.equation, codes, correction.x, self.sign)
-        if tangent is None:
+        end, kink = self._corrected(correction), None
+        if end is None:
             return None
-        end = TangentPoint(correction.x, codes, tangent)
-        kink = None
         if end.codes != self.current.codes:
             kink = confirm(self.equation, self.current, end, self.sign, self.options.transition_tolerance)
         if self.equation.dot(end.tangent, correction.tangent) < 0:
