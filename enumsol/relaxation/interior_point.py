@@ -7,7 +7,6 @@ from typing import TYPE_CHECKING
 import numpy as np
 import scipy.sparse as sp
 from scipy.linalg import solve_triangular
-from scipy.optimize import nnls
 
 from enumsol.model.statuses import CONTACT, UNDECIDED
 from enumsol.relaxation.engine import EQUALITY, PRUNE_MARGIN, Relaxation, row_terms
@@ -117,6 +116,8 @@ class SoftenedEngine(InteriorPointEngine):
 
     def solved(self, on: dict[int, int]) -> Relaxation:
         """The relaxation with these rows and their modes, solved from scratch."""
+        from scipy.optimize import nnls  # most searches need it nowhere
+
         equal = [row for row, mode in on.items() if mode == EQUALITY]
         order, k = np.array(equal + [row for row, mode in on.items() if mode != EQUALITY], dtype=np.intp), len(equal)
         lower = self._lower_normals[order]

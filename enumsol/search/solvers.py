@@ -276,7 +276,7 @@ class Solvers(SearchSetup):
     @property
     def _fallback(self) -> Callable[[], InteriorPointEngine]:
         if self.arithmetic == "verified" and self.problem.held and (enclosed := self.enclosed) is not None:
-            # an error of S y of form_error |y| costs this much by (6.3) of theory
+            # an error of S y of form_error |y| costs this much: theory, (6.3)
             return partial(SoftenedEngine, self.relaxed, 0.25 * enclosed.form_error**2 / enclosed.smallest_eigenvalue)
         return partial(InteriorPointEngine, self.relaxed)
 
