@@ -190,11 +190,12 @@ class TreeCloser:
         return False
 
 
-#: A search begins again with lookahead after so many nodes; after fewer, trees do that are soon done.
-NODES = 1000
+#: A search begins again with lookahead after so many nodes. After more, more are lost, and clips gain less; after 400
+#: the tree of the dovetail does, which is soon done (studies/branching_rule).
+NODES = 500
 #: Share of the tree below which it does, and decisions down to which it then looks ahead: with larger shares trees
 #: begin again that are soon done, and deeper clips take twice as many nodes (studies/branching_rule).
-_DEPTHS = ((5e-4, 12), (0.05, 6))
+_DEPTHS = ((5e-4, 12), (0.03, 6))
 #: What is added to the shares, and the weight of three children beside two (studies/branching_rule).
 _LEAST, _LATER = 1e-2, 0.05
 #: Number of decisions that a status took; of the others two.
@@ -216,16 +217,21 @@ class Lookahead:
 
     def __init__(self, relaxations: Relaxations) -> None:
         self._relaxations = relaxations
-        self.depth = -1
+        self.depth, self._decided = -1, False
 
     @property
     def pays(self) -> bool:
         """True if it may pay: relaxations do not solve the children of all nodes anyway, as those of 3D do."""
         return not self._relaxations.engine.solves_children
 
-    def begins(self, nodes: int, covered: float) -> bool:
+    def due(self, nodes: int) -> bool:
+        """True if it is time to decide, once, whether to look ahead."""
+        return not self._decided and nodes >= NODES and self.pays
+
+    def begins(self, covered: float) -> bool:
         """True if a search that has done such a share of the tree had better look ahead; it does from then on."""
-        if self.pays and nodes >= NODES:
+        self._decided = True
+        if self.pays:
             self.depth = next((depth for share, depth in _DEPTHS if covered < share), -1)
         return self.depth >= 0
 

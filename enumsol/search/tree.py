@@ -241,14 +241,21 @@ class TreeSearch:
         def due() -> bool:
             return forms.due(self.outcome.nodes, self.covered)
 
+        def stops() -> bool:
+            nodes = self.outcome.nodes
+            return self.lookahead.due(nodes) or due() or self.closer.begins_again(nodes)
+
         stack = list[Any](start)
         while stack:
-            stack = self.loop(stack, lambda: due() or self.closer.begins_again(self.outcome.nodes))
-            if not stack or due():
+            stack = self.loop(stack, stops)
+            looks = bool(stack) and self.lookahead.due(self.outcome.nodes)
+            if looks and not self.lookahead.begins(self.covered):
+                continue
+            if not looks and (not stack or due()):
                 break
             self._forget(held)
-            stack = [] if self._one(start[0]) else list(start)
-        if stack and (self._pays(forms) or self.lookahead.begins(self.outcome.nodes, self.covered)):
+            stack = [] if not looks and self._one(start[0]) else list(start)
+        if stack and self._pays(forms):
             self._forget(held)
             return list(start)
         return stack
@@ -256,7 +263,9 @@ class TreeSearch:
     def _pays(self, forms: Forms) -> bool:
         """True if a form is found that is better than the energy, before the time is over."""
         with suppress(TimeOverError), within(self.limits):
-            return forms.pay(self.relaxations.engine, self.relaxations.nothing, self.relaxations.rows)
+            if forms.pay(self.relaxations.engine, self.relaxations.nothing, self.relaxations.rows):
+                self.lookahead.depth = -1
+                return True
         return False
 
     def _forget(self, held: KeptRecords) -> None:
@@ -279,8 +288,8 @@ class TreeSearch:
             if stack and self._pays(forms):
                 # from here on without the parents' relaxations, which are the energy's
                 stack = [replace(item, parent=None) if isinstance(item, TreeNode) else item for item in stack]
-            elif stack:
-                self.lookahead.begins(self.outcome.nodes, self.covered)
+            elif stack and self.lookahead.due(self.outcome.nodes):
+                self.lookahead.begins(self.covered)
         self.loop(stack, None)
 
     def examined(self, items: Sequence[TreeNode], nodes: int) -> list[TreeNode]:
