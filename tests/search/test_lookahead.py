@@ -7,7 +7,7 @@ import pytest
 from compare import assert_as_exhaustive, differences
 from complete import proven_roots
 from generators import named, random_problem
-from proof_tools import bytes_of
+from proof_tools import by_forms, bytes_of, records_of
 
 from enumsol import enumerate_roots
 from enumsol.search import nodes, setup
@@ -93,3 +93,39 @@ def test_a_resumed_search_that_did_not_look_ahead_does_not(soon, monkeypatch, tm
     path.write_bytes(path.read_bytes()[:-2000])
     found = proven_roots(problem, alpha, proof_path=path, resume=True)
     assert found.stats.resumed + found.stats.nodes == whole.stats.nodes
+
+
+def test_a_search_decides_once_and_goes_on_where_it_stands(monkeypatch):
+    problem, alpha = named("wedge-14-5")
+    plain, asked = enumerate_roots(problem, alpha), []
+    begins = nodes.Lookahead.begins
+
+    def noted(self, covered):
+        asked.append(begins(self, covered))
+        return asked[-1]
+
+    monkeypatch.setattr(nodes, "NODES", 100)
+    monkeypatch.setattr(nodes, "_DEPTHS", ())
+    monkeypatch.setattr(nodes.Lookahead, "begins", noted)
+    found = enumerate_roots(problem, alpha)
+    assert asked == [False]
+    assert found.stats.nodes == plain.stats.nodes
+    assert bytes_of(found.proof) == bytes_of(plain.proof)
+
+
+@pytest.mark.usefixtures("tree_only")
+def test_a_search_with_a_form_that_pays_does_not_look_ahead(soon, monkeypatch):
+    (problem, alpha), looked, pay = named("wedge-14-5"), [], nodes.Forms.pay
+
+    def noted(self, *arguments):
+        looked.append(len(soon))
+        return pay(self, *arguments)
+
+    monkeypatch.setattr(nodes, "NODES", 50)
+    monkeypatch.setattr(nodes, "MORE", -2.0)
+    monkeypatch.setattr(nodes.Forms, "pay", noted)
+    found = proven_roots(problem, alpha)
+    # until then it did
+    assert looked == [len(soon)]
+    assert soon
+    assert by_forms(records_of(found.proof))
