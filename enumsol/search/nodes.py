@@ -230,9 +230,7 @@ class Lookahead:
 
     def begins(self, covered: float) -> bool:
         """True if a search that has done such a share of the tree had better look ahead; it does from then on."""
-        self._decided = True
-        if self.pays:
-            self.depth = next((depth for share, depth in _DEPTHS if covered < share), -1)
+        self._decided, self.depth = True, next((depth for share, depth in _DEPTHS if covered < share), -1)
         return self.depth >= 0
 
     def choose(self, codes: Codes, relaxation: Relaxation) -> int:

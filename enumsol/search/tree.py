@@ -238,26 +238,19 @@ class TreeSearch:
     def _begin(self, start: list[TreeNode], held: KeptRecords, forms: Forms) -> list[Any]:
         """Search until it is known how the search goes on: from the beginning, if that is better; what still waits."""
 
-        def due() -> bool:
-            return forms.due(self.outcome.nodes, self.covered)
-
         def stops() -> bool:
             nodes = self.outcome.nodes
-            return self.lookahead.due(nodes) or due() or self.closer.begins_again(nodes)
+            return self.lookahead.due(nodes) or forms.due(nodes, self.covered) or self.closer.begins_again(nodes)
 
         stack = list[Any](start)
-        while stack:
-            stack = self.loop(stack, stops)
-            looks = bool(stack) and self.lookahead.due(self.outcome.nodes)
-            if looks and not self.lookahead.begins(self.covered):
-                continue
-            if not looks and (not stack or due()):
-                break
-            self._forget(held)
-            stack = [] if not looks and self._one(start[0]) else list(start)
-        if stack and self._pays(forms):
-            self._forget(held)
-            return list(start)
+        while stack and (stack := self.loop(stack, stops)):
+            if self.lookahead.due(self.outcome.nodes):
+                stack = self._again(start, held) if self.lookahead.begins(self.covered) else stack
+            elif forms.due(self.outcome.nodes, self.covered):
+                return self._again(start, held) if self._pays(forms) else stack
+            else:
+                stack = self._again(start, held)
+                stack = [] if self._one(start[0]) else stack
         return stack
 
     def _pays(self, forms: Forms) -> bool:
@@ -268,11 +261,13 @@ class TreeSearch:
                 return True
         return False
 
-    def _forget(self, held: KeptRecords) -> None:
+    def _again(self, start: list[TreeNode], held: KeptRecords) -> list[Any]:
+        """Forget what was found and proven; where the search began."""
         held.drop()
         self.certifier.forget()
         self.outcome.forget()
         self.covered = 0.0
+        return list(start)
 
     def below(self, items: Sequence[TreeNode], form: Any, *, trial: bool = False) -> None:
         """Examine subtrees, the last first, with a form that is known to hold for them; or on trial with a new one."""
