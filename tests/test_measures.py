@@ -11,7 +11,7 @@ from documents import ROOT
 
 #: A change that lowers a measure lowers its bound; one that has to raise it says why in its commit.
 BOUNDS = {
-    "code lines": 51_638,
+    "code lines": 51_639,
     "classes": 585,
     "kinds of records": 18,
     "parameters annotated Any": 106,

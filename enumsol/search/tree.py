@@ -245,7 +245,9 @@ class TreeSearch:
         stack = list[Any](start)
         while stack and (stack := self.loop(stack, stops)):
             if self.lookahead.due(self.outcome.nodes):
-                stack = self._again(start, held) if self.lookahead.begins(self.covered) else stack
+                # what was found is kept where few nodes are left to find it again
+                share = self.covered if self.left is None or self.left >= self.outcome.nodes else 1.0
+                stack = self._again(start, held) if self.lookahead.begins(share) else stack
             elif forms.due(self.outcome.nodes, self.covered):
                 return self._again(start, held) if self._pays(forms) else stack
             else:

@@ -113,6 +113,16 @@ def test_a_search_decides_once_and_goes_on_where_it_stands(monkeypatch):
     assert bytes_of(found.proof) == bytes_of(plain.proof)
 
 
+def test_a_search_with_few_nodes_left_keeps_what_it_found(soon):
+    problem, alpha = named("wedge-14-5")
+    before = [enumerate_roots(problem, alpha, max_nodes=count) for count in (99, 100, 150)]
+    assert not soon
+    assert len(before[0]) >= 1
+    assert all(len(found) >= len(before[0]) for found in before)
+    enumerate_roots(problem, alpha, max_nodes=200)
+    assert soon
+
+
 @pytest.mark.usefixtures("tree_only")
 def test_a_search_with_a_form_that_pays_does_not_look_ahead(soon, monkeypatch):
     (problem, alpha), looked, pay = named("wedge-14-5"), [], nodes.Forms.pay
